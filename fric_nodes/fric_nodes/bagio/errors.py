@@ -1,0 +1,19 @@
+"""The errors of this room: a recording, or a file to be imported, that cannot be used."""
+
+from __future__ import annotations
+
+from ..record import RecordError
+
+__all__ = ["BagError", "ImportingError", "WriteError"]
+
+
+class BagError(RecordError):
+    """A bag that cannot be read, or whose content cannot be used."""
+
+
+class WriteError(RecordError):
+    """A bag that cannot be written where it was asked for."""
+
+
+class ImportingError(RecordError):
+    """A file or a mapping that cannot be imported."""

@@ -1,0 +1,194 @@
+"""Reading an MCAP file record by record, up to the last one that is complete.
+
+A recorder that was killed leaves a file without footer and index, which readers refuse; the messages are there all the same.
+This walks over the records in the order they were written, takes what is whole and says what is not. Layout of the file: MCAP
+version 0 specification: magic, then records of one byte opcode, eight bytes length, content; chunks hold compressed records.
+"""
+
+from __future__ import annotations
+
+import mmap
+import struct
+import sys
+from binascii import crc32
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
+
+from .errors import BagError
+from .topics import Raw, Topic
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
+__all__ = ["MAGIC", "McapScan", "mcap_metadata"]
+
+MAGIC = b"\x89MCAP0\r\n"
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _METADATA, _DATA_END, _FOOTER = 0x03, 0x04, 0x05, 0x06, 0x0C, 0x0F, 0x02
+_FORMATS = {"ros2msg": MessageDefinitionFormat.MSG, "ros2idl": MessageDefinitionFormat.IDL, "omgidl": MessageDefinitionFormat.IDL}
+
+
+class _Channel(NamedTuple):
+    topic: str
+    msgtype: str
+    definition: MessageDefinition
+
+
+def _string(content: bytes, at: int) -> tuple[str, int]:
+    """String with its length before it; the text and the offset after it."""
+    (size,) = struct.unpack_from("<I", content, at)
+    if at + 4 + size > len(content):
+        raise struct.error("string reaches over the end of its record")
+    return content[at + 4 : at + 4 + size].decode("utf-8", errors="replace"), at + 4 + size
+
+
+def _string_map(content: bytes, at: int) -> dict[str, str]:
+    (size,) = struct.unpack_from("<I", content, at)
+    at, end = at + 4, at + 4 + size
+    pairs: dict[str, str] = {}
+    while at < end:
+        key, at = _string(content, at)
+        pairs[key], at = _string(content, at)
+    return pairs
+
+
+def _records(content: bytes | mmap.mmap, at: int) -> Iterator[tuple[int, int, int, bool]]:
+    """Opcode, first byte, end, and whether it is complete, of each record from ``at`` on."""
+    total = len(content)
+    while at + 9 <= total:
+        opcode, size = struct.unpack_from("<BQ", content, at)
+        start, stop = at + 9, at + 9 + size
+        yield opcode, start, min(stop, total), stop <= total
+        at = stop
+
+
+def _unpacked(data: bytes, compression: str) -> bytes:
+    """Content of a chunk, or as much of it as its first bytes give."""
+    if compression == "":
+        return data
+    if compression == "zstd":
+        return bytes(zstd.ZstdDecompressor().decompress(data))
+    if compression == "lz4":
+        return bytes(LZ4FrameDecompressor().decompress(data))
+    raise ValueError(f"compression {compression!r} is not known")
+
+
+class McapScan:
+    """Messages of an MCAP file without use of its index.
+
+    Attributes:
+        topics: what the complete records hold.
+        damage: what is incomplete or unreadable, in plain words; filled by the first pass over the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Pass once over the file.
+
+        Raises:
+            BagError: empty, or not an MCAP file.
+        """
+        self.path = path
+        self.damage: list[str] = []
+        self._channels: dict[int, _Channel] = {}
+        self._schemas: dict[int, tuple[str, MessageDefinition]] = {}
+        if path.stat().st_size == 0:
+            raise BagError(path, "is empty (0 bytes)", "record again")
+        with path.open("rb") as file:
+            self._content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        if self._content[: len(MAGIC)] != MAGIC:
+            raise BagError(path, "is not an MCAP file (its first bytes are not those of one)", "give a rosbag2 recording")
+        counts: dict[int, int] = {}
+        for channel, _, _ in self._messages(self.damage):
+            counts[channel] = counts.get(channel, 0) + 1
+        lost = sum(count for channel, count in counts.items() if channel not in self._channels)
+        if lost:
+            self.damage.append(f"{lost} messages lost: the description of their topic is not readable")
+        merged: dict[tuple[str, str], Topic] = {}
+        for number, channel_entry in self._channels.items():
+            key = (channel_entry.topic, channel_entry.msgtype)
+            before = merged[key].count if key in merged else 0
+            merged[key] = Topic(*key, before + counts.get(number, 0), channel_entry.definition)
+        self.topics = tuple(merged.values())
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._content.close()
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]:
+        """Messages in the order they were written; of all topics when ``topics`` is None."""
+        wanted = {
+            number: entry for number, entry in self._channels.items() if topics is None or entry.topic in topics
+        }
+        for number, log_time, data in self._messages([]):
+            entry = wanted.get(number)
+            if entry is not None:
+                yield Raw(entry.topic, entry.msgtype, log_time, data)
+
+    def _messages(self, damage: list[str]) -> Iterator[tuple[int, int, bytes]]:
+        for opcode, start, stop, complete in _records(self._content, len(MAGIC)):
+            if opcode in {_DATA_END, _FOOTER}:
+                return
+            if opcode == 0 or (opcode > _DATA_END and opcode < 0x80):
+                damage.append(f"not readable from byte {start - 9} on")
+                return
+            if opcode == _CHUNK:
+                yield from self._chunk(self._content[start:stop], complete, start, damage)
+            elif complete and opcode in {_SCHEMA, _CHANNEL, _MESSAGE}:
+                yield from self._record(opcode, self._content[start:stop])
+        damage.append("not closed by its recorder (no end mark); read up to its last complete record")
+
+    def _chunk(self, content: bytes, complete: bool, at: int, damage: list[str]) -> Iterator[tuple[int, int, bytes]]:
+        try:
+            size, crc = struct.unpack_from("<QI", content, 16)
+            compression, head = _string(content, 28)
+            data = _unpacked(content[head + 8 :], compression)
+        except (struct.error, ValueError, RuntimeError, EOFError, zstd.ZstdError):
+            damage.append(f"block at byte {at} is not readable and left out")
+            return
+        if complete and (len(data) != size or (crc and crc32(data) != crc)):
+            damage.append(f"block at byte {at} is damaged (checksum or size) and left out")
+            return
+        for opcode, start, stop, whole in _records(data, 0):
+            if whole and opcode in {_SCHEMA, _CHANNEL, _MESSAGE}:
+                yield from self._record(opcode, data[start:stop])
+
+    def _record(self, opcode: int, content: bytes) -> Iterator[tuple[int, int, bytes]]:
+        try:
+            if opcode == _MESSAGE:
+                channel, _, log_time = struct.unpack_from("<HIQ", content)
+                yield channel, log_time, content[22:]
+            elif opcode == _SCHEMA:
+                (number,) = struct.unpack_from("<H", content)
+                name, at = _string(content, 2)
+                encoding, at = _string(content, at)
+                text, at = _string(content, at)
+                self._schemas[number] = (name, MessageDefinition(_FORMATS.get(encoding, MessageDefinitionFormat.NONE), text))
+            else:
+                number, schema = struct.unpack_from("<HH", content)
+                topic, _ = _string(content, 4)
+                msgtype, definition = self._schemas.get(schema, ("unknown", MessageDefinition(MessageDefinitionFormat.NONE, "")))
+                self._channels[number] = _Channel(topic, msgtype, definition)
+        except struct.error:
+            return  # a record that does not hold what it should is as good as absent
+
+
+def mcap_metadata(path: Path, name: str) -> dict[str, str]:
+    """Key and value pairs of the metadata record ``name``, looked for among the first records of the file; empty without one."""
+    with path.open("rb") as file:
+        head = file.read(1 << 16)
+    for count, (opcode, start, stop, complete) in enumerate(_records(head, len(MAGIC))):
+        if count > 8 or not complete:
+            break
+        if opcode == _METADATA:
+            try:
+                found, at = _string(head[start:stop], 0)
+                if found == name:
+                    return _string_map(head[start:stop], at)
+            except struct.error:
+                break
+    return {}

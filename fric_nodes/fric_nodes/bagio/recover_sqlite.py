@@ -1,0 +1,137 @@
+"""Reading an SQLite bag that its recorder did not close, up to the last complete record and without changing it.
+
+SQLite repairs an interrupted database when it is opened for writing, from the journal that lies beside it. The repair is done
+on a copy in a temporary folder; the user's files stay as they are.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import sys
+from collections.abc import Collection, Iterator
+from contextlib import closing, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from .errors import BagError
+from .topics import Raw, Topic
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
+__all__ = ["SqliteScan", "has_journal", "sqlite_metadata"]
+
+_JOURNALS = ("-journal", "-wal", "-shm")
+_ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+_FORMATS = {"ros2msg": MessageDefinitionFormat.MSG, "ros2idl": MessageDefinitionFormat.IDL}
+
+
+def has_journal(path: Path) -> bool:
+    """True when a journal with content lies beside the database: its recorder did not close it, or is still at work."""
+    for suffix in ("-journal", "-wal"):
+        journal = path.with_name(path.name + suffix)
+        if journal.is_file() and journal.stat().st_size:
+            return True
+    return False
+
+
+class SqliteScan:
+    """Messages of an SQLite bag, as far as the database can be read.
+
+    Attributes:
+        topics: what the readable rows hold.
+        damage: what is not readable, in plain words.
+        custom: key and value pairs that fric's own recorder stored at the beginning.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Copy, repair the copy and count what is there.
+
+        Raises:
+            BagError: empty, not a database, or without a single readable topic.
+        """
+        self.path = path
+        self.damage: list[str] = []
+        if path.stat().st_size == 0:
+            raise BagError(path, "is empty (0 bytes)", "record again")
+        self._folder = TemporaryDirectory(prefix="fric-bag-")
+        try:
+            copy = Path(self._folder.name) / "bag.db3"
+            shutil.copyfile(path, copy)
+            for suffix in _JOURNALS:
+                beside = path.with_name(path.name + suffix)
+                if beside.is_file():
+                    shutil.copyfile(beside, copy.with_name(copy.name + suffix))
+            self._connection = sqlite3.connect(copy)
+            self._names = self._read_topics()
+        except BaseException as error:
+            self.close()
+            if isinstance(error, sqlite3.DatabaseError):
+                raise BagError(
+                    path, f"cannot be read as an SQLite bag ({error})", "it is truncated or damaged beyond use: record again"
+                ) from error
+            raise
+        counts: dict[int, int] = dict.fromkeys(self._names, 0)
+        for number, _, _ in self._rows(self.damage):
+            counts[number] = counts.get(number, 0) + 1
+        definitions = self._read_definitions()
+        none = MessageDefinition(MessageDefinitionFormat.NONE, "")
+        self.topics = tuple(
+            Topic(name, msgtype, counts[number], definitions.get(msgtype, none))
+            for number, (name, msgtype) in self._names.items()
+        )
+
+    def close(self) -> None:
+        """Remove the copy."""
+        with suppress(AttributeError):
+            self._connection.close()
+        self._folder.cleanup()
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]:
+        """Messages in the order they were written; of all topics when ``topics`` is None."""
+        for number, log_time, data in self._rows([]):
+            name, msgtype = self._names.get(number, ("", ""))
+            if name and (topics is None or name in topics):
+                # A lone file does not say that its messages are compressed; the first bytes do.
+                plain = zstd.decompress(data) if data[:4] == _ZSTD_MAGIC else data
+                yield Raw(name, msgtype, log_time, plain)
+
+    def _read_topics(self) -> dict[int, tuple[str, str]]:
+        rows = self._connection.execute("SELECT id, name, type FROM topics ORDER BY id")
+        return {int(number): (str(name), str(msgtype)) for number, name, msgtype in rows}
+
+    def _read_definitions(self) -> dict[str, MessageDefinition]:
+        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+        try:
+            return {
+                str(name): MessageDefinition(_FORMATS.get(encoding, MessageDefinitionFormat.NONE), str(text))
+                for name, encoding, text in self._connection.execute(query)
+            }
+        except sqlite3.DatabaseError:
+            return {}  # bags older than schema version 4 have no such table
+
+    def _rows(self, damage: list[str]) -> Iterator[tuple[int, int, bytes]]:
+        try:
+            # In the order of the row number: the index on the time may be damaged where the table is not.
+            yield from self._connection.execute("SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY id")
+        except sqlite3.DatabaseError as error:
+            damage.append(f"read up to its last readable row ({error})")
+
+
+def sqlite_metadata(path: Path) -> dict[str, str]:
+    """``custom_data`` of the newest metadata row of an SQLite bag; empty without one."""
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)) as connection:
+            row = connection.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
+        content = YAML(typ="safe").load(row[0]) if row else None
+    except (sqlite3.Error, YAMLError):
+        return {}
+    custom = content.get("custom_data") if isinstance(content, dict) else None
+    return {str(key): str(value) for key, value in custom.items()} if isinstance(custom, dict) else {}

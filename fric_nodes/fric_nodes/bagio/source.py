@@ -1,0 +1,203 @@
+"""Opening a recording, whatever state it is in: one source of raw messages for all that reads bags.
+
+Bags in order are read through ``rosbags``. A bag that its recorder did not close, a lone storage file and a folder without
+``metadata.yaml`` are read record by record as far as they go; what was wrong is kept in :attr:`Source.notes`.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+
+import apsw
+from rosbags.rosbag2 import Reader, ReaderError
+
+from .errors import BagError
+from .recover_mcap import McapScan, mcap_metadata
+from .recover_sqlite import SqliteScan, has_journal, sqlite_metadata
+from .topics import Raw, Topic
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
+__all__ = ["Source"]
+
+_REMEDY = "give a rosbag2 folder, or a .mcap or .db3 file"
+# What the library lets through when a file is not what it should be.
+_LIBRARY_ERRORS = (ReaderError, OSError, ValueError, IndexError, KeyError, EOFError, AssertionError, RuntimeError)
+_DAMAGE = (*_LIBRARY_ERRORS, apsw.Error, zstd.ZstdError, TypeError)
+
+
+def _storage_files(folder: Path) -> list[Path]:
+    """Storage files of a folder in the order of their names (``bag_2`` before ``bag_10``)."""
+    found = [path for path in folder.iterdir() if path.is_file() and _kind(path)]
+    return sorted(found, key=lambda path: (len(path.name), path.name))
+
+
+def _kind(path: Path) -> str | None:
+    """``mcap`` or ``sqlite3`` by the name, None for anything else."""
+    name = path.name.removesuffix(".zstd")
+    return "mcap" if name.endswith(".mcap") else "sqlite3" if name.endswith(".db3") else None
+
+
+class Source:
+    """An open recording; a context manager.
+
+    Attributes:
+        path: what the user gave.
+        topics: topics with their types and numbers of messages.
+        storage: ``mcap`` or ``sqlite3``.
+        custom: the key and value pairs that the recorder stored with the bag.
+        notes: what was wrong with the files and how they were read all the same.
+    """
+
+    def __init__(self, path: str | Path, *, recover: bool = False) -> None:
+        """Open a recording.
+
+        Args:
+            path: bag folder, or a ``.mcap`` or ``.db3`` file.
+            recover: read record by record even if the bag looks in order.
+
+        Raises:
+            BagError: not there, not a bag, or damaged beyond use.
+        """
+        self.path = Path(path)
+        self.notes: list[str] = []
+        self.custom: dict[str, str] = {}
+        self.storage = ""
+        self.topics: tuple[Topic, ...] = ()
+        self._stack = ExitStack()
+        self._reader: Reader | None = None
+        self._scans: list[McapScan | SqliteScan] = []
+        files = self._find()
+        try:
+            if recover or not self._open_library(files):
+                self._open_scans(files)
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def __enter__(self) -> Source:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close all files."""
+        self._stack.close()
+
+    @property
+    def recovered(self) -> bool:
+        """True when the bag is read record by record."""
+        return self._reader is None
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]:
+        """Messages in the order of reception; of all topics when ``topics`` is None.
+
+        Raises:
+            BagError: the storage turns out to be damaged on the way.
+        """
+        if self._reader is None:
+            for scan in self._scans:
+                yield from scan.messages(topics)
+            return
+        chosen = [x for x in self._reader.connections if topics is None or x.topic in topics]
+        if not chosen:
+            return
+        try:
+            for connection, log_time, data in self._reader.messages(chosen):
+                yield Raw(connection.topic, connection.msgtype, log_time, data)
+        except _DAMAGE as error:
+            raise BagError(self.path, f"is damaged ({error})", "record again, or restore it from a copy") from error
+
+    def _find(self) -> list[Path]:
+        path = self.path
+        if not path.exists():
+            raise BagError(path, "is not there", "check the path")
+        if path.is_file():
+            if _kind(path) is None:
+                raise BagError(path, "is not a recording (neither .mcap nor .db3)", _REMEDY)
+            return [path]
+        files = _storage_files(path)
+        if not files:
+            raise BagError(path, "is not a bag: there is no .mcap or .db3 file in it", _REMEDY)
+        return files
+
+    def _open_library(self, files: list[Path]) -> bool:
+        """Open through rosbags; False, with a note, when that does not work."""
+        in_order = self.path.is_dir() and (self.path / "metadata.yaml").is_file()
+        if self.path.is_dir() and not in_order:
+            self.notes.append("metadata.yaml is missing: the recorder was not stopped properly")
+            if len(files) > 1:
+                return False
+        target = self.path if in_order else files[0]
+        if target.name.endswith(".zstd"):
+            return False
+        if any(_kind(file) == "sqlite3" and has_journal(file) for file in files):
+            self.notes.append("a journal lies beside the database: its recorder did not close it")
+            return False
+        try:
+            reader = Reader(target)
+            reader.open()
+        except _DAMAGE as error:
+            self.notes.append(f"read record by record, because its index is not usable ({str(error).rstrip('.')})")
+            return False
+        self._stack.callback(reader.close)
+        if not in_order and _kind(target) == "sqlite3":
+            # Only metadata.yaml says whether single messages are compressed; the scan looks at each.
+            return False
+        self._reader = reader
+        merged: dict[tuple[str, str], Topic] = {}
+        for x in reader.connections:
+            before = merged[x.topic, x.msgtype].count if (x.topic, x.msgtype) in merged else 0
+            merged[x.topic, x.msgtype] = Topic(x.topic, x.msgtype, before + x.msgcount, x.msgdef)
+        self.topics = tuple(merged.values())
+        self.storage = _kind(files[0]) or ""
+        # rosbags has no public access to the custom data of a folder.
+        custom = reader.storage.metadata.custom if in_order else None
+        self.custom = dict(custom) if custom else self._stored_custom(files[0])
+        return True
+
+    def _open_scans(self, files: list[Path]) -> None:
+        merged: dict[tuple[str, str], Topic] = {}
+        for file in files:
+            plain = self._unpacked(file) if file.name.endswith(".zstd") else file
+            kind = _kind(file)
+            try:
+                scan: McapScan | SqliteScan = McapScan(plain) if kind == "mcap" else SqliteScan(plain)
+            except BagError as error:
+                raise BagError(file, error.problem, error.remedy) from error
+            self._stack.callback(scan.close)
+            self._scans.append(scan)
+            self.notes += [f"{file.name}: {problem}" for problem in scan.damage]
+            for topic in scan.topics:
+                before = merged.get((topic.name, topic.msgtype))
+                count = topic.count + (before.count if before else 0)
+                merged[topic.name, topic.msgtype] = topic._replace(count=count)
+            self.storage = kind or ""
+            self.custom = self.custom or self._stored_custom(plain)
+        self.topics = tuple(merged.values())
+        if not any(topic.count for topic in self.topics):
+            raise BagError(self.path, "holds no complete message", "it is truncated beyond use or empty: record again")
+
+    def _stored_custom(self, file: Path) -> dict[str, str]:
+        return mcap_metadata(file, "fric") if _kind(file) == "mcap" else sqlite_metadata(file)
+
+    def _unpacked(self, file: Path) -> Path:
+        """A file that is compressed as a whole, decompressed as far as it goes, in a temporary folder."""
+        folder = self._stack.enter_context(TemporaryDirectory(prefix="fric-bag-"))
+        plain = Path(folder) / file.name.removesuffix(".zstd")
+        with plain.open("wb") as target, zstd.open(file, "rb") as packed:
+            try:
+                shutil.copyfileobj(packed, target)
+            except (EOFError, zstd.ZstdError):
+                self.notes.append(f"{file.name}: compressed file is cut off; read as far as it goes")
+        return plain

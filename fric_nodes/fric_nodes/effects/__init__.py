@@ -1,0 +1,21 @@
+"""The catalogue of effects: one physical effect per file, found by being here.
+
+A new effect is one new module with a constant ``EFFECT``, and its test. Nothing has to be registered anywhere else.
+"""
+
+from __future__ import annotations
+
+from ..registry import discover
+from ..effect import Effect
+
+__all__ = ["EFFECTS", "by_name"]
+
+EFFECTS: dict[str, Effect] = {effect.key: effect for effect in discover(__name__, "EFFECT", Effect)}
+"""Every effect by its key, ``id`` or ``id/law``."""
+
+
+def by_name(effect: str, law: str = "") -> Effect | None:
+    """The effect ``effect`` in the form ``law``; without a law the one form there is, or the first by file name."""
+    if law:
+        return EFFECTS.get(f"{effect}/{law}")
+    return next((found for found in EFFECTS.values() if found.id == effect), None)

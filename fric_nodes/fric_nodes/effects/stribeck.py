@@ -1,0 +1,46 @@
+"""Stribeck effect: friction falls from its static to its Coulomb level as the lubricant film builds up with speed.
+
+Equation: F = (F_S - F_C) exp(-(|v|/v_S)^delta) sgn(v), on top of the Coulomb level. The parameter is the surplus
+F_S - F_C, so that terms stay independent of each other: break-away takes the sum of both levels.
+Source: Szell, Eq. 10; the printed exponent lacks the brackets that make delta act on |v/v_S|, as in Armstrong-Helouvry et al.
+1994.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..effect import Context, Effect, Place
+from ..kernel import kernel
+from ..parameter import Parameter
+
+__all__ = ["EFFECT"]
+
+
+@kernel
+def level(c: Context, base: float, force: float, velocity: float, exponent: float) -> float:
+    ratio = abs(c.velocity) / velocity
+    # The common exponents skip the general power, which costs more than the rest of a step together.
+    if exponent == 1.0:
+        return base + force * math.exp(-ratio)
+    if exponent == 2.0:  # noqa: PLR2004
+        return base + force * math.exp(-ratio * ratio)
+    return base + force * math.exp(-(ratio**exponent))
+
+
+EFFECT = Effect(
+    id="stribeck",
+    law="exponential",
+    place=Place.SLIP_LEVEL,
+    title="Stribeck effect",
+    equation="F = (F_S - F_C) exp(-(|v|/v_S)^delta) sgn(v)",
+    source="Szell, Eq. 10; Armstrong-Helouvry, Dupont, Canudas de Wit 1994",
+    parameters=(
+        Parameter("force", "F_S - F_C", "F", "surplus of static friction over Coulomb friction", lower=0.0, linear=True),
+        Parameter("velocity", "v_S", "x/s", "Stribeck velocity, where the surplus has fallen to 1/e", positive=True),
+        Parameter("exponent", "delta", "1", "shape of the fall", lower=0.1, upper=10.0, default=2.0, shape=True),
+    ),
+    level=level,
+    regime="low speed, both directions: more force than at moderate speed",
+    looks_like={"dwell_time": "repeat reversals with rests of graded length: only dwell time makes break-away depend on the rest"},
+)

@@ -1,0 +1,272 @@
+"""Inverse dynamics: the force equation u = f(q, v, a) solved for the parameters, from filtered motion.
+
+For a structure whose force is linear in its parameters this is least squares on the regressors (Gautier and Khalil; Janot, Gautier,
+Brunot 2019 for the EMPS axis), with bounds, and with Huber weights against spikes where asked for. Nonlinear parameters (a Stribeck velocity, a bristle
+stiffness) are tried over a grid of sensible values, the linear ones solved for at each (separable least squares), and then all are
+refined together. The regressors are the model's own compiled terms with one parameter set to one, so nothing is typed twice.
+
+Samples at rest don't enter a fit of sliding friction: there the friction is whatever balances the drive, and sgn(v) is noise. A structure
+with pre-sliding describes them and uses them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares, lsq_linear
+
+from ..model import Model
+from ..record import Array, Mask, Record
+from ..simulate import Predictor
+from .equations import Equations, Stretch, equations
+from .free_parameters import FreeParameters, candidates
+from .result import Identification, IdentificationError, Method, Options
+from .scoring import score
+from .statistics import sandwich_covariance
+from .verdict import collinear, warnings_of
+
+__all__ = ["METHOD", "fit", "fit_force"]
+
+_HUBER = 1.345
+_REWEIGHTINGS = 12
+
+
+def predicted(model: Model, found: Equations) -> Array:
+    """Force that ``model`` predicts at the rows of ``found``, shape ``(n_rows,)``."""
+
+    def along(stretch: Stretch) -> Array:
+        effort, _ = Predictor(model).run(
+            stretch.time,
+            stretch.position,
+            stretch.velocity,
+            stretch.acceleration,
+            stretch.sample_time,
+            stretch.load,
+            stretch.temperature,
+        )
+        return effort
+
+    return found.rows(along)
+
+
+def regressors(model: Model, found: Equations) -> Array:
+    """One column per parameter of ``model`` in which its force is linear; zero columns elsewhere, ``(n_rows, n_parameters)``."""
+    linear = np.array([parameter.declaration.linear for parameter in model.parameters()])
+    base = np.where(linear, 0.0, model.values)
+    columns = np.zeros((found.force.shape[0], linear.shape[0]))
+    for number in np.flatnonzero(linear):
+        unit = base.copy()
+        unit[number] = 1.0
+        columns[:, number] = predicted(model.with_values(unit), found)
+    return columns
+
+
+def weights(residual: Array, use: Mask, robust: bool) -> Array:
+    """Weight of each squared residual, 0 where not used, shape ``(n_rows,)``; Huber's when ``robust``."""
+    scale = 1.4826 * float(np.median(np.abs(residual[use])))
+    if not robust or scale == 0.0:
+        return use.astype(np.float64)
+    return use * np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), 1e-300))
+
+
+@dataclass(frozen=True, eq=False)
+class _LinearFit:
+    values: Array
+    residual: Array
+    weight: Array
+    cost: float
+
+
+def _fit_linear(model: Model, found: Equations, free: FreeParameters, use: Mask, robust: bool) -> _LinearFit:
+    """Bounded least squares for the free linear parameters, the others as in ``model``."""
+    columns = regressors(model, found)
+    values = model.values
+    linear = np.array([parameter.declaration.linear for parameter in model.parameters()])
+    values_of_held = np.where(linear, values, 0.0)
+    values_of_held[free.index] = 0.0
+    target = found.force - columns @ values_of_held
+    part = columns[:, free.index]
+    scale = np.linalg.norm(part[use], axis=0)
+    scale[scale == 0.0] = 1.0
+    weight = use.astype(np.float64)
+    solution = np.zeros(free.index.shape[0])
+    for _ in range(_REWEIGHTINGS):
+        root = np.sqrt(weight)
+        answer = lsq_linear(
+            (root[:, None] * part / scale)[use], (root * target)[use], bounds=(free.lower * scale, free.upper * scale)
+        )
+        previous, solution = solution, np.asarray(answer.x) / scale
+        residual = target - part @ solution
+        weight = weights(residual, use, robust)
+        if np.allclose(solution, previous, rtol=1e-6, atol=0.0):
+            break
+    values[free.index] = solution
+    return _LinearFit(values, residual, weight, _cost(residual, use, robust))
+
+
+def _cost(residual: Array, use: Mask, robust: bool) -> float:
+    """Sum of squares; of absolute values when robust, since candidates have Huber scales of their own."""
+    left = residual[use]
+    return float(np.sum(np.abs(left))) if robust else float(left @ left)
+
+
+def _search_static(model: Model, found: Equations, free: FreeParameters, robust: bool) -> Model:
+    """The static structure with linear parameters solved for and nonlinear ones chosen on their grid."""
+    linear, nonlinear = free.only(True), free.only(False)
+    use = found.sliding
+    best = _fit_linear(model, found, linear, use, robust)
+    level = float(np.median(np.abs(found.force[use])))
+    declared = list(model.parameters())
+    for number in nonlinear.index:
+        for value in candidates(declared[number].declaration.dimension, found, level):
+            trial_values = best.values.copy()
+            trial_values[number] = value
+            trial = _fit_linear(model.with_values(trial_values), found, linear, use, robust)
+            if trial.cost < best.cost:
+                best = trial
+    return model.with_values(best.values)
+
+
+def _search_dynamic(model: Model, found: Equations, free: FreeParameters, robust: bool) -> Model:
+    """The best start for the parameters of the slip dynamics, the static ones as they are."""
+    declared = list(model.parameters())
+    use = np.ones(found.force.shape[0], dtype=np.bool_)
+    level = float(np.median(np.abs(found.force)))
+    best, best_cost = model, np.inf
+    for number in free.only(False).index:
+        for value in candidates(declared[number].declaration.dimension, found, level):
+            values = best.values
+            values[number] = value
+            trial = model.with_values(values)
+            cost = _cost(found.force - predicted(trial, found), use, robust)
+            if cost < best_cost:
+                best, best_cost = trial, cost
+    return best
+
+
+def _refine(
+    model: Model, found: Equations, free: FreeParameters, use: Mask, robust: bool
+) -> tuple[Model, Array, Array, Array]:
+    """All free parameters together by trust-region least squares: model, residual, Jacobian and weights at the optimum."""
+    start = model.values
+    scale = np.maximum(np.abs(start[free.index]), 1e-3 * _typical(model, found, free))
+
+    def residual(scaled: Array) -> Array:
+        values = start.copy()
+        values[free.index] = scaled * scale
+        return found.force - predicted(model.with_values(values), found)
+
+    weight = weights(residual(start[free.index] / scale), use, robust)
+    point = np.clip(start[free.index], free.lower, free.upper) / scale
+    for _ in range(5):
+        root = np.sqrt(weight)
+        answer = least_squares(
+            lambda scaled, root=root: root * residual(scaled),
+            point,
+            bounds=(free.lower / scale, free.upper / scale),
+            diff_step=1e-5,
+            xtol=1e-8,
+            ftol=1e-10,
+            max_nfev=60,
+        )
+        previous, point = point, np.asarray(answer.x)
+        left = residual(point)
+        weight = weights(left, use, robust)
+        if not robust or np.allclose(point, previous, rtol=1e-4, atol=1e-9):
+            break
+    jacobian = np.asarray(answer.jac) / np.where(root > 0, root, 1.0)[:, None] / scale
+    values = start.copy()
+    values[free.index] = point * scale
+    return model.with_values(values), left, jacobian, weight
+
+
+def _typical(model: Model, found: Equations, free: FreeParameters) -> Array:
+    """Typical size of each free parameter, for those that start at zero."""
+    force = float(np.std(found.force))
+    speed = float(np.std(found.velocity))
+    acceleration = float(np.std(np.concatenate([stretch.acceleration for stretch in found.stretches])))
+    sizes = {"F": force, "F s/x": force / speed, "F s^2/x": force / acceleration, "x/s": speed}
+    dimensions = [parameter.declaration.dimension for parameter in model.parameters()]
+    return np.array([sizes.get(dimensions[number], 1.0) for number in free.index])
+
+
+def fit_force(model: Model, records: Sequence[Record], options: Options) -> tuple[Model, FreeParameters, Array, Equations, list[str]]:
+    """The fit itself: model, what was fitted, covariance, the equations and warnings about what was not."""
+    found = equations(list(records), options)
+    if int(np.sum(found.sliding)) < 2 * len(model.names):
+        raise IdentificationError(
+            records[0].source, "the joint hardly moves", f"record motion faster than {found.rest_velocity:.3g} {model.units.position}/s"
+        )
+    free = FreeParameters.of(model, options)
+    static = model.with_terms(held for held in model.terms if held.effect.slip is None)
+    static_free = FreeParameters.of(static, _for_structure(options, static))
+    twins = collinear(static, regressors(static, found)[:, static_free.index], static_free, found.sliding)
+    messages = [twin.message for twin in twins]
+    free = free.without({twin.name for twin in twins})
+    static_free = static_free.without({twin.name for twin in twins})
+    static = _search_static(static, found, static_free, options.robust)
+    by_name = {parameter.name: parameter.value for parameter in static.parameters()}
+    model = model.with_values(np.array([by_name.get(p.name, p.value) for p in model.parameters()]))
+    use = found.sliding
+    if model.has_slip_dynamics:
+        model = _search_dynamic(model, found, free.without(set(static_free.names)), options.robust)
+        use = np.ones_like(found.sliding)
+    model, residual, jacobian, weight = _refine(model, found, free, use, options.robust)
+    size = np.linalg.norm(jacobian[use], axis=0) * np.abs(model.values[free.index])
+    inside = ~free.at_bound(model) & (size > 1e-9 * np.max(size, initial=0.0))
+    covariance = np.full((len(free.names), len(free.names)), np.nan)
+    covariance[np.ix_(inside, inside)] = sandwich_covariance(
+        jacobian[np.ix_(use, inside)], residual[use], weight[use], _starts_within(found, use)
+    )
+    return model, free, covariance, found, messages
+
+
+def _for_structure(options: Options, model: Model) -> Options:
+    """The options without names that ``model`` doesn't have."""
+    held = tuple(name for name in options.held if name in model.names)
+    return Options(held=held, freed=tuple(name for name in options.freed if name in model.names))
+
+
+def _starts_within(found: Equations, use: Mask) -> Array:
+    """First row of each stretch, and of each run of used rows, among the used rows."""
+    row = np.flatnonzero(use)
+    fresh = np.isin(row, found.starts) | (np.diff(row, prepend=row[0]) > 1)
+    return np.flatnonzero(fresh)
+
+
+def standard_errors(free: FreeParameters, covariance: Array) -> dict[str, float]:
+    """Standard error by name, of those parameters that have one."""
+    variance = np.diag(covariance)
+    return {name: float(np.sqrt(value)) for name, value in zip(free.names, variance, strict=True) if value >= 0}
+
+
+def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
+    """Fit ``structure`` to ``records`` by inverse dynamics.
+
+    Raises:
+        IdentificationError: the recordings can't determine it.
+    """
+    model, free, covariance, found, messages = fit_force(structure, records, options)
+    model = model.with_values(model.values, standard_errors(free, covariance))
+    warnings, status = warnings_of(model, free, covariance)
+    return Identification(
+        model=model,
+        fitted=free.names,
+        covariance=covariance,
+        method=METHOD.id,
+        status=status,
+        warnings=(*messages, *warnings),
+        notes=found.notes,
+        train=score(model, records, options, found),
+    )
+
+
+METHOD = Method(
+    id="inverse-dynamics",
+    title="inverse dynamics by least squares",
+    needs="motion in both directions at several speeds and accelerations; position and force",
+    source="Gautier 1997; Janot, Gautier, Brunot 2019",
+    fit=fit,
+)

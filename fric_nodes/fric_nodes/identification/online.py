@@ -1,0 +1,292 @@
+"""Online identification: recursive least squares on the same equations as offline, with forgetting only where there is news.
+
+Samples are gathered into blocks, each block goes through the same zero-phase filters, regressors and decimation as a whole recording
+(:mod:`fric_nodes.identification.equations`), and every row updates the estimate. Offline and online values therefore differ by their
+weighting in time and by nothing else; the price is a latency of one block and two filter edges.
+
+Forgetting is directional (Cao and Schwartz 2000): with information matrix R and regressor phi
+
+    R <- R - (1 - lambda) R phi phi' R / (phi' R phi) + phi phi',
+
+so that old information fades only along directions in which new information comes in. A parameter that the motion does not excite
+keeps its value and its standard error, however long the axis rests or repeats itself: no wind-up, no drift.
+
+The covariance is the sandwich R^-1 S R^-1, with S the forgetting sum of score products over blocks of time: correlated residuals, which
+every real axis has, widen the intervals as they should. While there are too few blocks for that, the white-noise formula
+widened by the residuals' first autocorrelation stands in.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from ..model import Model
+from ..record import Array, Mask, Record, RecordError
+from .equations import Equations, equations
+from .free_parameters import FreeParameters
+from .inverse_dynamics import regressors
+from .result import IdentificationError, Options
+
+__all__ = ["Estimate", "OnlineIdentifier", "State"]
+
+_BLOCK_TIME = 0.5  # [s]
+_MIN_BLOCKS_PER_PARAMETER = 3
+
+
+class State(IntEnum):
+    """What the identifier is doing; numbers as in ``fric_interfaces/FrictionEstimate``."""
+
+    IDLE = 0
+    RUNNING = 1
+    FROZEN = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The estimate so far; arrays of shape ``(n_parameters,)``.
+
+    Attributes:
+        names: of the parameters estimated.
+        values: in SI.
+        standard_errors: NaN while nothing is known.
+        covariance: shape ``(n_parameters, n_parameters)``.
+        excited: True where the data determine the parameter to better than 20 %.
+        residual_rms: of the force equation [F].
+        samples_used: samples that went into the estimate.
+        samples_rejected: samples that were refused (not finite, stamps not increasing).
+        state: what the identifier is doing.
+        status: the same in words, with what to do next.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    standard_errors: Array
+    covariance: Array
+    excited: Mask
+    residual_rms: float
+    samples_used: int
+    samples_rejected: int
+    state: State
+    status: str
+
+
+class OnlineIdentifier:
+    """Recursive estimator of the parameters in which a model's force is linear.
+
+    Args:
+        structure: the terms to estimate; its values are the start, its nonlinear parameters stay as they are.
+        forgetting_time: how long information counts, in time of informative motion [s]; infinite: for ever.
+        options: filter settings, as offline.
+    """
+
+    def __init__(self, structure: Model, forgetting_time: float = 60.0, options: Options | None = None) -> None:
+        self.options = Options() if options is None else options
+        self.forgetting_time = forgetting_time
+        self.state = State.RUNNING
+        self._restart(structure)
+
+    def _restart(self, structure: Model) -> None:
+        slipping = [held for held in structure.terms if held.effect.slip is None]
+        self._whole = structure
+        self.structure = structure.with_terms(slipping)
+        self._free = FreeParameters.of(self.structure, self.options).only(True)
+        n = len(self._free.names)
+        self._values = self.structure.values[self._free.index]
+        self._information = np.zeros((n, n))
+        self._scores = np.zeros((n, n))
+        self._n_blocks = 0.0
+        self._energy = self._lagged_energy = self._weight = 0.0
+        self._last_residual = 0.0
+        self.samples_used = 0
+        self.samples_rejected = 0
+        self._clear_buffer()
+
+    def _clear_buffer(self) -> None:
+        self._time: list[float] = []
+        self._position: list[float] = []
+        self._effort: list[float] = []
+
+    def reset(self, structure: Model | None = None) -> None:
+        """Forget everything; with ``structure``, estimate other terms from now on."""
+        self._restart(self._whole if structure is None else structure)
+
+    def freeze(self, frozen: bool) -> None:
+        """Hold the estimate as it is, or go on."""
+        self.state = State.FROZEN if frozen else State.RUNNING
+        self._clear_buffer()
+
+    def update(self, time: float, position: float, effort: float) -> bool:
+        """Take one sample; True when the estimate has changed.
+
+        Args:
+            time: [s], increasing.
+            position: [x].
+            effort: [F].
+        """
+        if self.state is not State.RUNNING:
+            return False
+        if not (math.isfinite(time) and math.isfinite(position) and math.isfinite(effort)):
+            self.samples_rejected += 1
+            return False
+        if self._time and time <= self._time[-1]:
+            self.samples_rejected += 1
+            if time < self._time[0]:
+                # The clock was set back (a machine or a recording started again): what is in the buffer belongs to the past.
+                self._clear_buffer()
+            return False
+        self._time.append(time)
+        self._position.append(position)
+        self._effort.append(effort)
+        if time - self._time[0] < self._block_span():
+            return False
+        return self._take_block()
+
+    def _block_span(self) -> float:
+        """Time that a block and its two filter edges take [s]."""
+        n = len(self._time)
+        step = (self._time[-1] - self._time[0]) / (n - 1) if n > 1 else 0.0
+        cutoff = self.options.cutoff or min(0.1 / step, 100.0) if step > 0 else 100.0
+        return max(_BLOCK_TIME, 30 * 10 * step) + 10.0 / cutoff
+
+    def _take_block(self) -> bool:
+        """Turn the buffer into equations, learn from them, and keep its end as the next block's first edge."""
+        time = np.array(self._time)
+        step = np.diff(time)
+        if float(np.max(step)) > max(10.0 * float(np.median(step)), 0.05):
+            after = int(np.argmax(step)) + 1
+            for samples in (self._time, self._position, self._effort):
+                del samples[:after]
+            self.samples_rejected += after
+            return False
+        try:
+            record = Record(time - time[0], np.array(self._position), np.array(self._effort), source="joint states")
+            found = equations([record], self.options)
+        except (RecordError, IdentificationError):
+            self._clear_buffer()
+            return False
+        learnt = self._learn(found)
+        row_time = float(found.time[1] - found.time[0])
+        sample_time = record.sample_time
+        edge = round(float(found.time[0]) / sample_time)
+        done = round(found.time.shape[0] * row_time / sample_time)
+        self.samples_used += int(np.sum(found.sliding)) * round(row_time / sample_time)
+        keep_from = min(done, len(self._time) - edge)
+        for samples in (self._time, self._position, self._effort):
+            del samples[:keep_from]
+        return learnt
+
+    def _learn(self, found: Equations) -> bool:
+        columns = regressors(self.structure, found)
+        held = np.where([p.declaration.linear for p in self.structure.parameters()], self.structure.values, 0.0)
+        held[self._free.index] = 0.0
+        target = found.force - columns @ held
+        rows = columns[:, self._free.index]
+        row_time = float(found.time[1] - found.time[0])
+        forgetting = math.exp(-row_time / self.forgetting_time) if math.isfinite(self.forgetting_time) else 1.0
+        score = np.zeros(rows.shape[1])
+        n_learnt = 0
+        for phi, force, sliding in zip(rows, target, found.sliding, strict=True):
+            if not sliding or abs(float(phi @ phi)) == 0.0:
+                continue
+            residual = self._update(phi, float(force), forgetting)
+            score += phi * residual
+            n_learnt += 1
+        if n_learnt:
+            fade = forgetting**n_learnt
+            self._scores = fade * self._scores + np.outer(score, score)
+            self._n_blocks = fade * self._n_blocks + 1.0
+        return n_learnt > 0
+
+    def _update(self, phi: Array, force: float, forgetting: float) -> float:
+        """One row into the estimate; the residual before it [F]."""
+        residual = force - float(phi @ self._values)
+        image = self._information @ phi
+        along = float(phi @ image)
+        if along > 0.0:
+            self._information -= (1.0 - forgetting) / along * np.outer(image, image)
+        self._information += np.outer(phi, phi)
+        # Scaled, since the columns differ by orders of magnitude; the pseudo-inverse leaves directions without information alone.
+        scale = np.sqrt(np.maximum(np.diag(self._information), 1e-300))
+        gain = np.linalg.pinv(self._information / np.outer(scale, scale), rcond=1e-9, hermitian=True) @ (phi / scale) / scale
+        self._values = self._values + gain * residual
+        after = force - float(phi @ self._values)
+        self._energy = forgetting * self._energy + after * after
+        self._lagged_energy = forgetting * self._lagged_energy + after * self._last_residual
+        self._weight = forgetting * self._weight + 1.0
+        self._last_residual = after
+        return after
+
+    def covariance(self) -> Array:
+        """Covariance of the estimate, shape ``(n_parameters, n_parameters)``; NaN while nothing is known."""
+        n = self._values.shape[0]
+        if self._weight <= n:
+            return np.full((n, n), np.nan)
+        scale = np.sqrt(np.maximum(np.diag(self._information), 1e-300))
+        bread = np.linalg.pinv(self._information / np.outer(scale, scale), rcond=1e-9, hermitian=True) / np.outer(scale, scale)
+        variance = self._energy / (self._weight - n)
+        rho = min(max(self._lagged_energy / self._energy, 0.0), 0.98) if self._energy > 0 else 0.0
+        white = bread * variance * (1.0 + rho) / (1.0 - rho)
+        if self._n_blocks <= _MIN_BLOCKS_PER_PARAMETER * n:
+            return np.asarray(white, dtype=np.float64)
+        correction = self._n_blocks / (self._n_blocks - n)
+        return np.asarray(correction * bread @ self._scores @ bread, dtype=np.float64)
+
+    def _known(self) -> Mask:
+        """True for each parameter along whose axis there is information."""
+        scale = np.sqrt(np.diag(self._information))
+        known = scale > 0
+        n = int(np.sum(known))
+        if n == 0:
+            return known
+        part = self._information[np.ix_(known, known)] / np.outer(scale[known], scale[known])
+        eigenvalues, vectors = np.linalg.eigh(part)
+        blind = vectors[:, eigenvalues < 1e-6 * eigenvalues[-1]]
+        known[known] = np.sum(blind**2, axis=1) < 1e-6
+        return np.asarray(known, dtype=np.bool_)
+
+    def estimate(self) -> Estimate:
+        """The estimate as it stands."""
+        covariance = self.covariance()
+        known = self._known()
+        errors = np.where(known, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.nan)
+        values = np.clip(self._values, self._free.lower, self._free.upper)
+        with np.errstate(invalid="ignore"):
+            excited = known & (errors < 0.2 * np.abs(values))
+        if self.state is State.FROZEN:
+            status = "frozen: unfreeze to go on learning"
+        elif not self.samples_used:
+            status = "waiting for motion"
+        elif np.all(excited):
+            status = "every parameter is determined"
+        else:
+            missing = [name for name, good in zip(self._free.names, excited, strict=True) if not good]
+            status = f"not determined yet: {', '.join(missing)}; move at more speeds and accelerations, in both directions"
+        rms = math.sqrt(self._energy / self._weight) if self._weight > 0 else math.nan
+        return Estimate(
+            self._free.names,
+            values,
+            np.asarray(errors, dtype=np.float64),
+            covariance,
+            np.asarray(excited, dtype=np.bool_),
+            rms,
+            self.samples_used,
+            self.samples_rejected,
+            self.state,
+            status,
+        )
+
+    def model(self) -> Model:
+        """The structure with the values estimated so far and their standard errors; slip dynamics as they were given."""
+        found = self.estimate()
+        by_name = dict(zip(found.names, found.values.tolist(), strict=True))
+        errors = {
+            name: error
+            for name, error in zip(found.names, found.standard_errors.tolist(), strict=True)
+            if math.isfinite(error)
+        }
+        values = np.array([by_name.get(p.name, p.value) for p in self._whole.parameters()])
+        return self._whole.with_values(values, errors)

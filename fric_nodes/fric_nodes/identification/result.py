@@ -1,0 +1,113 @@
+"""What every identification method takes and gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+from ..model import Model
+from ..record import Array, Record
+
+__all__ = ["Identification", "IdentificationError", "Method", "Options", "Score"]
+
+
+class IdentificationError(InputError):
+    """Recordings from which the model's parameters can't be determined."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of a fit; None lets the method choose from the data.
+
+    Attributes:
+        cutoff: of the zero-phase low-pass filter on the position [Hz].
+        decimation: keep every n-th sample of the filtered equations.
+        rest_velocity: a joint that stays slower than this rests, and tells nothing about sliding friction meanwhile [x/s].
+        held: names of parameters to hold at their value.
+        freed: names of shape parameters to fit as well.
+        robust: weigh down outliers (Huber) instead of plain least squares.
+        horizon: length of the free runs of an output-error fit [s]; None: the whole recording in one run.
+    """
+
+    cutoff: float | None = None
+    decimation: int | None = None
+    rest_velocity: float | None = None
+    held: tuple[str, ...] = ()
+    freed: tuple[str, ...] = ()
+    robust: bool = False
+    horizon: float | None = None
+
+
+@dataclass(frozen=True)
+class Score:
+    """How well a model explains recordings.
+
+    Attributes:
+        noe: normalised output error of the force, 100 sum (u - u_hat)^2 / sum (u - mean u)^2 [%] (Amthor 2008, Eq. 19).
+        relative_force_error_percent: 100 ||u - u_hat|| / ||u|| [%].
+        force_rmse: root mean square of u - u_hat [F].
+        position_rmse: root mean square error of the position in a free run from the measured force [x].
+        n_samples: number of force equations behind these figures.
+    """
+
+    noe: float
+    relative_force_error_percent: float
+    force_rmse: float
+    position_rmse: float
+    n_samples: int
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Result of a fit.
+
+    Attributes:
+        model: the structure with the values found and their standard errors.
+        fitted: names of the parameters that were fitted, in the order of ``covariance``.
+        covariance: shape ``(n_fitted, n_fitted)``, residual correlation taken into account; NaN for a parameter on its bound.
+        method: id of the method.
+        status: what was reached, and what to do next.
+        warnings: what a user should know before trusting the values.
+        notes: what was dropped or left out of the recordings, and why.
+        train: score on the recordings that were fitted.
+        validation: score on recordings that no fit has seen, or None.
+    """
+
+    model: Model
+    fitted: tuple[str, ...]
+    covariance: Array
+    method: str
+    status: str
+    train: Score
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    validation: Score | None = None
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation matrix of the fitted parameters, shape ``(n_fitted, n_fitted)``."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        scale = np.where(deviation > 0, deviation, 1.0)
+        return np.asarray(self.covariance / np.outer(scale, scale), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Method:
+    """One identification method.
+
+    Attributes:
+        id: name on the command line.
+        title: name in a sentence.
+        needs: which experiment it needs.
+        source: paper.
+        fit: structure (a model whose values are the start), recordings and options to a result.
+    """
+
+    id: str
+    title: str
+    needs: str
+    source: str
+    fit: Callable[[Model, Sequence[Record], Options], Identification] = field(repr=False)

@@ -1,0 +1,64 @@
+"""How well a model explains recordings: the force it predicts, and where it ends up in a free run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..model import Model
+from ..record import Array, Record
+from ..simulate import Predictor, simulate
+from .equations import Equations, Stretch, equations
+from .result import Options, Score
+
+__all__ = ["free_run", "score"]
+
+
+def score(model: Model, records: Sequence[Record], options: Options, found: Equations | None = None) -> Score:
+    """Score of ``model`` on ``records``: every valid sample counts, whatever weight a fit gave it.
+
+    Args:
+        model: with its values.
+        records: the recordings.
+        options: filter settings, as used in the fit.
+        found: the equations of ``records``, when they are at hand.
+    """
+    found = equations(list(records), options) if found is None else found
+
+    def along(stretch: Stretch) -> Array:
+        return Predictor(model).run(
+            stretch.time,
+            stretch.position,
+            stretch.velocity,
+            stretch.acceleration,
+            stretch.sample_time,
+            stretch.load,
+            stretch.temperature,
+        )[0]
+
+    error = found.force - found.rows(along)
+    spread = found.force - float(np.mean(found.force))
+    off = np.concatenate([free_run(model, stretch) - stretch.raw_position for stretch in found.stretches])
+    return Score(
+        noe=100.0 * float(error @ error) / float(spread @ spread),
+        relative_force_error_percent=100.0 * float(np.linalg.norm(error) / np.linalg.norm(found.force)),
+        force_rmse=float(np.sqrt(np.mean(error**2))),
+        position_rmse=float(np.sqrt(np.mean(off**2))),
+        n_samples=int(error.shape[0]),
+    )
+
+
+def free_run(model: Model, stretch: Stretch) -> Array:
+    """Position of ``model`` [x], shape ``(n,)``, led by the measured force alone from the stretch's first position and velocity."""
+    motion = simulate(
+        model,
+        stretch.effort,
+        stretch.sample_time,
+        position=float(stretch.position[0]),
+        velocity=float(stretch.velocity[0]),
+        hold=stretch.hold,
+        load=stretch.load[:-1] if stretch.load.shape[0] > 1 else stretch.load,
+        temperature=stretch.temperature[:-1] if stretch.temperature.shape[0] > 1 else stretch.temperature,
+    )
+    return motion.position

@@ -1,0 +1,271 @@
+"""The text form of a model, ``format: fric-model/1`` (YAML): read, check, write, and its JSON schema.
+
+Every refusal names the file, the line, what is wrong there and what to write instead. Files are written aside and renamed, so a
+failed write leaves the old file as it was.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from io import StringIO
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import YAMLError
+
+from .effects import EFFECTS, by_name
+from .model import Model, ModelError, Term, build_model
+from .parameter import Parameter
+from .plants import PLANTS
+from .record import Units
+
+__all__ = ["FORMAT", "json_schema", "model_from_text", "model_to_text", "read_model", "write_model"]
+
+FORMAT = "fric-model/1"
+
+_STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class _UnitsEntry(BaseModel):
+    model_config = _STRICT
+    position: Literal["m", "rad"]
+    force: str = Field(min_length=1)
+
+
+class _Header(BaseModel):
+    """Everything of a file but the parts that depend on the plant and the effects."""
+
+    model_config = _STRICT
+    format: Literal["fric-model/1"]
+    joint: str = Field(min_length=1)
+    units: _UnitsEntry
+    plant: dict[str, Any]
+    terms: list[dict[str, Any]]
+    standard_errors: dict[str, Annotated[float, Field(ge=0)]] = {}
+    provenance: dict[str, str] = {}
+
+
+def _field(parameter: Parameter) -> tuple[Any, Any]:
+    bounds: dict[str, Any] = {}
+    if parameter.positive:
+        bounds["gt"] = max(parameter.lower, 0.0)
+    elif parameter.lower > -float("inf"):
+        bounds["ge"] = parameter.lower
+    if parameter.upper < float("inf"):
+        bounds["le"] = parameter.upper
+    default = ... if parameter.default is None else parameter.default
+    return float, Field(default, description=f"{parameter.symbol} [{parameter.dimension}]: {parameter.doc}", **bounds)
+
+
+@lru_cache(maxsize=1)
+def _term_entries() -> dict[str, type[BaseModel]]:
+    """A pydantic model for each effect, by its key."""
+    entries = {}
+    for key, effect in EFFECTS.items():
+        fields: dict[str, Any] = {"effect": (Literal[effect.id], ...)}
+        if effect.law:
+            is_default = by_name(effect.id) is effect
+            fields["law"] = (Literal[effect.law], effect.law if is_default else ...)
+        fields |= {parameter.name: _field(parameter) for parameter in effect.parameters}
+        doc = f"{effect.title}: {effect.equation} ({effect.source})"
+        entries[key] = create_model(f"term_{key.replace('/', '_')}", __config__=_STRICT, __doc__=doc, **fields)
+    return entries
+
+
+@lru_cache(maxsize=1)
+def _plant_entries() -> dict[str, type[BaseModel]]:
+    """A pydantic model for each kind of plant, by its id."""
+    entries = {}
+    for plant in PLANTS.values():
+        fields: dict[str, Any] = {"type": (Literal[plant.id], ...)}
+        fields |= {parameter.name: _field(parameter) for parameter in plant.parameters}
+        doc = f"{plant.title}: {plant.equation} ({plant.source})"
+        entries[plant.id] = create_model(f"plant_{plant.id}", __config__=_STRICT, __doc__=doc, **fields)
+    return entries
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON schema of a model file with all plants and effects that there are."""
+    plants = tuple(_plant_entries().values())
+    terms = tuple(_term_entries().values())
+    whole = create_model(
+        "fric_model_1",
+        __base__=_Header,
+        plant=(Union[plants], ...),  # noqa: UP007 - built from a tuple
+        terms=(list[Union[terms]], ...),  # type: ignore[valid-type] # noqa: UP007
+    )
+    return whole.model_json_schema()
+
+
+def read_model(path: str | os.PathLike[str]) -> Model:
+    """The model in the file ``path``.
+
+    Raises:
+        ModelError: the file can't be read or isn't a valid model.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ModelError(path, "no such file", "give the path of a fric-model/1 file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(path, f"cannot be read ({error})", "give the path of a fric-model/1 text file") from None
+    return model_from_text(text, str(path))
+
+
+def model_from_text(text: str, source: str = "model") -> Model:
+    """The model that ``text`` describes; ``source`` names it in messages.
+
+    Raises:
+        ModelError: with line and reason.
+    """
+    try:
+        tree = YAML(typ="rt").load(text)
+    except YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f", line {mark.line + 1}" if mark is not None else ""
+        problem = getattr(error, "problem", None) or "is not YAML"
+        raise ModelError(f"{source}{line}", str(problem), "correct the YAML") from None
+    if not isinstance(tree, Mapping):
+        raise ModelError(source, "is not a model file", f"start it with 'format: {FORMAT}'")
+    header = _validated(_Header, tree, tree, (), source)
+    plant = _one_of(_plant_entries(), header.plant.get("type"), "type", tree, ("plant",), source)
+    plant_entry = _validated(plant, header.plant, tree, ("plant",), source)
+    terms = []
+    for number, raw in enumerate(header.terms):
+        at = ("terms", number)
+        effect = by_name(str(raw.get("effect")), str(raw.get("law", "")))
+        laws = [known.law for known in EFFECTS.values() if known.id == raw.get("effect")]
+        if effect is None and laws:
+            where = f"{source}, line {_line(tree, (*at, 'law'))}"
+            raise ModelError(where, f"law '{raw['law']}' of {raw['effect']} is not known", f"use one of {', '.join(laws)}")
+        entry_type = _one_of(_term_entries(), effect.key if effect else raw.get("effect"), "effect", tree, at, source)
+        entry = _validated(entry_type, raw, tree, at, source)
+        assert effect is not None
+        terms.append(Term(effect, tuple(float(getattr(entry, p.name)) for p in effect.parameters)))
+    plant_values = {p.name: float(getattr(plant_entry, p.name)) for p in PLANTS[header.plant["type"]].parameters}
+    try:
+        model = build_model(
+            header.plant["type"],
+            plant_values,
+            terms,
+            joint=header.joint,
+            units=Units(header.units.position, header.units.force),
+            standard_errors=header.standard_errors,
+            provenance=header.provenance,
+        )
+    except ModelError as error:
+        raise ModelError(f"{source}, line {_line(tree, ('terms',))}", error.problem, error.remedy) from None
+    stray = sorted(set(model.standard_errors) - set(model.names))
+    if stray:
+        where = f"{source}, line {_line(tree, ('standard_errors', stray[0]))}"
+        raise ModelError(where, f"standard error of '{stray[0]}', which the model doesn't have", f"use {', '.join(model.names)}")
+    return model
+
+
+def _one_of(
+    entries: Mapping[str, type[BaseModel]], name: object, key: str, tree: Any, at: tuple[str | int, ...], source: str
+) -> type[BaseModel]:
+    found = entries.get(str(name))
+    if found is None:
+        known = ", ".join(dict.fromkeys(entry.split("/")[0] for entry in entries))
+        given = "is missing" if name is None else f"'{name}' is not known"
+        raise ModelError(f"{source}, line {_line(tree, (*at, key))}", f"{key} {given}", f"use one of {known}")
+    return found
+
+
+def _validated(kind: type[BaseModel], raw: Any, tree: Any, at: tuple[str | int, ...], source: str) -> Any:
+    """``raw`` as ``kind``; the first thing wrong with it as a ModelError with its line."""
+    try:
+        return kind.model_validate(raw)
+    except ValidationError as error:
+        # A misspelt key shows as one unknown and one missing: the unknown one says more.
+        first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
+        location = (*at, *(part for part in first["loc"] if not str(part).startswith(("term_", "plant_"))))
+        name = ".".join(str(part) for part in location) or "file"
+        keys = ", ".join(kind.model_fields)
+        what, remedy = {
+            "extra_forbidden": (f"unknown key '{name}'", f"use only {keys}"),
+            "missing": (f"'{name}' is missing", _remedy_for_missing(kind, first["loc"])),
+        }.get(first["type"], (f"'{name}' is {first['input']!r}", f"{first['msg'][0].lower()}{first['msg'][1:]}"))
+        raise ModelError(f"{source}, line {_line(tree, location)}", what, remedy) from None
+
+
+def _remedy_for_missing(kind: type[BaseModel], location: Sequence[int | str]) -> str:
+    field = kind.model_fields.get(str(location[0]))
+    described = field.description if field is not None and field.description else None
+    if described is None and "units" in map(str, location):
+        described = "units: {position: m, force: N} (or rad and N m)"
+    return f"add it, {described}" if described else "add it"
+
+
+def _line(tree: Any, location: Sequence[str | int]) -> int:
+    """Line of the file, counted from 1, at which the entry at ``location``, or the nearest one around it, stands."""
+    line = 1
+    for key in location:
+        if not hasattr(tree, "lc"):
+            break
+        try:
+            at = tree.lc.value(key) if isinstance(key, int) else tree.lc.key(key)
+            line = int(at[0]) + 1
+            tree = tree[key]
+        except (KeyError, IndexError, TypeError, AttributeError):
+            break
+    return line
+
+
+def model_to_text(model: Model) -> str:
+    """``model`` as the text of a model file, with a unit behind every value."""
+    yaml = YAML(typ="rt")
+    yaml.default_flow_style = False
+    yaml.width = 120
+    def entry(first: Mapping[str, str], parameters: Sequence[Parameter], values: Sequence[float]) -> CommentedMap:
+        held = CommentedMap(first)
+        for parameter, value in zip(parameters, values, strict=True):
+            held[parameter.name] = value
+            held.yaml_add_eol_comment(f"{parameter.symbol} [{parameter.unit(model.units)}]", parameter.name)
+        return held
+
+    root = CommentedMap()
+    root["format"] = FORMAT
+    root["joint"] = model.joint
+    units = CommentedMap({"position": model.units.position, "force": model.units.force})
+    units.fa.set_flow_style()
+    root["units"] = units
+    root["plant"] = entry({"type": model.plant.id}, model.plant.parameters, model.plant_values)
+    terms = CommentedSeq()
+    for held in model.terms:
+        first = {"effect": held.effect.id} | ({"law": held.effect.law} if held.effect.law else {})
+        terms.append(entry(first, held.effect.parameters, held.values))
+    if not model.terms:
+        terms.fa.set_flow_style()
+    root["terms"] = terms
+    if model.standard_errors:
+        root["standard_errors"] = CommentedMap({name: float(error) for name, error in model.standard_errors.items()})
+    if model.provenance:
+        root["provenance"] = CommentedMap(model.provenance)
+    stream = StringIO()
+    yaml.dump(root, stream)
+    return stream.getvalue()
+
+
+def write_model(model: Model, path: str | os.PathLike[str]) -> None:
+    """Write ``model`` to ``path``, all or nothing.
+
+    Raises:
+        ModelError: the file can't be written.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile("w", dir=target.parent, suffix=".tmp", delete=False, encoding="utf-8") as file:
+            file.write(model_to_text(model))
+        os.chmod(file.name, 0o644)
+        os.replace(file.name, target)
+    except OSError as error:
+        raise ModelError(path, f"cannot be written ({error})", "choose a folder that you can write to") from None

@@ -1,0 +1,205 @@
+"""What a model does: motion from force (simulation) and force from motion (prediction), in compiled loops.
+
+Fixed step, exact sticking, and as many sub-steps as the fastest rate of the model asks for. Long runs are one call; a node that goes
+sample by sample keeps a :class:`Simulator` or a :class:`Predictor`, whose state lives from call to call.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .model import Model
+from .record import Array
+
+__all__ = ["Motion", "Predictor", "Simulator", "intervals", "predict_force", "simulate"]
+
+_STEP_OF_RATE = 0.25  # largest product of step and fastest rate
+_MAX_SUBSTEPS = 2000
+_NOMINAL_LOAD = np.array([1.0])
+_NOMINAL_TEMPERATURE = np.array([0.0])
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Result of a simulation; every array has shape ``(n_samples,)``.
+
+    Attributes:
+        position: [x].
+        velocity: [x/s].
+        friction: contact's mean friction force over the interval that ends at the sample [F], 0 at the first.
+    """
+
+    position: Array
+    velocity: Array
+    friction: Array
+
+
+def intervals(effort: Array, hold: str) -> Array:
+    """The constant force of each interval between samples, shape ``(n_samples - 1,)``, from forces at the samples.
+
+    Args:
+        effort: force at each sample [F], shape ``(n_samples,)``.
+        hold: ``following``, ``preceding`` or ``linear``, see :attr:`fric_nodes.record.Record.effort_hold`.
+    """
+    if hold == "following":
+        return effort[:-1]
+    if hold == "preceding":
+        return effort[1:]
+    if hold == "linear":
+        return 0.5 * (effort[:-1] + effort[1:])
+    raise ValueError(f"hold is '{hold}', must be following, preceding or linear")
+
+
+def substeps(model: Model, sample_time: float) -> int:
+    """Steps per sample that the fastest rate of the model asks for."""
+    wanted = math.ceil(sample_time * model.max_rate() / _STEP_OF_RATE)
+    return min(max(wanted, 1), _MAX_SUBSTEPS)
+
+
+class Simulator:
+    """A model in motion, step by step; ``friction_state`` holds the states of its slip dynamics, ``(n_friction_states,)``.
+
+    Args:
+        model: what moves.
+        position: start [x].
+        velocity: start [x/s].
+    """
+
+    def __init__(self, model: Model, position: float = 0.0, velocity: float = 0.0) -> None:
+        self._loops = model.loops
+        self._values = model.values
+        self._model = model
+        self._state = np.zeros(len(model.plant.states))
+        self._state[:2] = position, velocity
+        self.friction_state = np.zeros(self._loops.n_friction_states)
+        self.time = 0.0
+
+    @property
+    def position(self) -> float:
+        """[x]."""
+        return float(self._state[0])
+
+    @property
+    def velocity(self) -> float:
+        """[x/s]."""
+        return float(self._state[1])
+
+    def run(
+        self,
+        effort: Array,
+        sample_time: float,
+        n_substeps: int | None = None,
+        load: Array = _NOMINAL_LOAD,
+        temperature: Array = _NOMINAL_TEMPERATURE,
+    ) -> tuple[Array, Array]:
+        """Lead the model over ``len(effort)`` intervals of ``sample_time`` [s], each under its constant force [F].
+
+        Returns:
+            States at the end of each interval, shape ``(n_intervals, n_states)``, and mean friction force, ``(n_intervals,)``.
+        """
+        n_substeps = substeps(self._model, sample_time) if n_substeps is None else n_substeps
+        states = np.empty((effort.shape[0], self._state.shape[0]))
+        friction = np.empty(effort.shape[0])
+        self._loops.simulate(
+            self._values, np.ascontiguousarray(effort), sample_time, n_substeps, self.time, load, temperature,
+            self._state, self.friction_state, states, friction,
+        )  # fmt: skip
+        self.time += effort.shape[0] * sample_time
+        return states, friction
+
+    def step(self, effort: float, duration: float) -> float:
+        """Lead the model over ``duration`` [s] under the constant force ``effort`` [F]; mean friction force [F]."""
+        _, friction = self.run(np.array([effort]), duration)
+        return float(friction[0])
+
+
+def simulate(
+    model: Model,
+    effort: Array,
+    sample_time: float,
+    *,
+    position: float = 0.0,
+    velocity: float = 0.0,
+    hold: str = "following",
+    n_substeps: int | None = None,
+    load: Array = _NOMINAL_LOAD,
+    temperature: Array = _NOMINAL_TEMPERATURE,
+) -> Motion:
+    """Free run of ``model`` under the forces ``effort``.
+
+    Args:
+        model: what moves.
+        effort: force at each sample [F], shape ``(n_samples,)``.
+        sample_time: [s].
+        position: start [x].
+        velocity: start [x/s].
+        hold: how a sample's force relates to the intervals beside it, see :func:`intervals`.
+        n_substeps: steps per sample; None takes what the model's fastest rate asks for.
+        load: normal load relative to nominal, one value or one per interval.
+        temperature: difference from the reference temperature [K], one value or one per interval.
+    """
+    states, friction = Simulator(model, position, velocity).run(
+        intervals(effort, hold), sample_time, n_substeps, load, temperature
+    )
+    return Motion(
+        position=np.concatenate([[position], states[:, 0]]),
+        velocity=np.concatenate([[velocity], states[:, 1]]),
+        friction=np.concatenate([[0.0], friction]),
+    )
+
+
+class Predictor:
+    """The force that a model needs along a motion; ``friction_state`` is kept from call to call.
+
+    Args:
+        model: what is to be moved.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._loops = model.loops
+        self._values = model.values
+        self.friction_state = np.zeros(self._loops.n_friction_states)
+
+    def run(
+        self,
+        time: Array,
+        position: Array,
+        velocity: Array,
+        acceleration: Array,
+        sample_time: float,
+        load: Array = _NOMINAL_LOAD,
+        temperature: Array = _NOMINAL_TEMPERATURE,
+    ) -> tuple[Array, Array]:
+        """Force needed at each sample and its friction part [F], each of shape ``(n_samples,)``."""
+        effort = np.empty(position.shape[0])
+        friction = np.empty(position.shape[0])
+        self._loops.predict(
+            self._values, time, position, velocity, acceleration, sample_time, load, temperature,
+            self.friction_state, effort, friction,
+        )  # fmt: skip
+        return effort, friction
+
+    def step(self, time: float, position: float, velocity: float, acceleration: float, duration: float) -> float:
+        """Force needed at one sample that stands for ``duration`` [s] of motion [F]."""
+        effort, _ = self.run(
+            np.array([time]), np.array([position]), np.array([velocity]), np.array([acceleration]), duration
+        )
+        return float(effort[0])
+
+
+def predict_force(
+    model: Model,
+    time: Array,
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+    sample_time: float,
+    load: Array = _NOMINAL_LOAD,
+    temperature: Array = _NOMINAL_TEMPERATURE,
+) -> Array:
+    """Force that ``model`` needs for a given motion [F], shape ``(n_samples,)``; at zero velocity without slip dynamics, none."""
+    effort, _ = Predictor(model).run(time, position, velocity, acceleration, sample_time, load, temperature)
+    return effort
