@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..record import RecordError
 
-__all__ = ["BagError", "ImportingError", "WriteError"]
+__all__ = ["BagError", "DamagedError", "ImportingError", "WriteError"]
 
 
 class BagError(RecordError):
@@ -17,3 +17,7 @@ class WriteError(RecordError):
 
 class ImportingError(RecordError):
     """A file or a mapping that cannot be imported."""
+
+
+class DamagedError(BagError):
+    """A bag that opens but whose content turns out to be damaged; reading record by record may still give some of it."""

@@ -17,7 +17,7 @@ from types import TracebackType
 import apsw
 from rosbags.rosbag2 import Reader, ReaderError
 
-from .errors import BagError
+from .errors import BagError, DamagedError
 from .recover_mcap import McapScan, mcap_metadata
 from .recover_sqlite import SqliteScan, has_journal, sqlite_metadata
 from .topics import Raw, Topic
@@ -103,7 +103,7 @@ class Source:
         """Messages in the order of reception; of all topics when ``topics`` is None.
 
         Raises:
-            BagError: the storage turns out to be damaged on the way.
+            DamagedError: the storage turns out to be damaged on the way.
         """
         if self._reader is None:
             for scan in self._scans:
@@ -116,7 +116,7 @@ class Source:
             for connection, log_time, data in self._reader.messages(chosen):
                 yield Raw(connection.topic, connection.msgtype, log_time, data)
         except _DAMAGE as error:
-            raise BagError(self.path, f"is damaged ({error})", "record again, or restore it from a copy") from error
+            raise DamagedError(self.path, f"is damaged ({error})", "record again, or restore it from a copy") from error
 
     def _find(self) -> list[Path]:
         path = self.path

@@ -135,6 +135,9 @@ def equations(records: list[Record], options: Options) -> Equations:
         rest = 0.02 * float(np.quantile(np.abs(velocity), 0.98))
     resting = [_at_rest(part, rest, decimation / rate) for part in np.split(velocity, starts[1:])]
     sliding = ~np.concatenate(resting)
+    rest_time = float(np.sum(~sliding)) * decimation / rate
+    if rest_time > 0:
+        notes.append(f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) don't count for sliding friction")
     return Equations(tuple(stretches), thin, np.concatenate(force), velocity, time, starts, sliding, rest, tuple(notes))
 
 

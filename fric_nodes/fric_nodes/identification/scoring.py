@@ -16,7 +16,10 @@ __all__ = ["free_run", "score"]
 
 
 def score(model: Model, records: Sequence[Record], options: Options, found: Equations | None = None) -> Score:
-    """Score of ``model`` on ``records``: every valid sample counts, whatever weight a fit gave it.
+    """Score of ``model`` on ``records``: every valid sample counts but those at rest, whatever weight a fit gave it.
+
+    At rest a static friction law leaves the force open, so that there is nothing to compare; leaving rest out for every structure keeps
+    the scores of different structures comparable.
 
     Args:
         model: with its values.
@@ -37,12 +40,14 @@ def score(model: Model, records: Sequence[Record], options: Options, found: Equa
             stretch.temperature,
         )[0]
 
-    error = found.force - found.rows(along)
-    spread = found.force - float(np.mean(found.force))
+    use = found.sliding
+    force = found.force[use]
+    error = force - found.rows(along)[use]
+    spread = force - float(np.mean(force))
     off = np.concatenate([free_run(model, stretch) - stretch.raw_position for stretch in found.stretches])
     return Score(
         noe=100.0 * float(error @ error) / float(spread @ spread),
-        relative_force_error_percent=100.0 * float(np.linalg.norm(error) / np.linalg.norm(found.force)),
+        relative_force_error_percent=100.0 * float(np.linalg.norm(error) / np.linalg.norm(force)),
         force_rmse=float(np.sqrt(np.mean(error**2))),
         position_rmse=float(np.sqrt(np.mean(off**2))),
         n_samples=int(error.shape[0]),

@@ -175,18 +175,20 @@ def main(args: list[str] | None = None) -> None:
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    with rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO):
-        try:
-            node = RecorderNode()
-            executor = SingleThreadedExecutor()
-            executor.add_node(node)
-            while not stop.is_set():
-                executor.spin_once(timeout_sec=0.1)
-            node.close()
-            node.destroy_node()
-        except InputError as error:
-            print(f"recorder: {error}", file=sys.stderr)
-            sys.exit(2)
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = RecorderNode()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        while not stop.is_set():
+            executor.spin_once(timeout_sec=0.1)
+        node.close()
+        node.destroy_node()
+    except InputError as error:
+        print(f"recorder: {error}", file=sys.stderr)
+        sys.exit(2)
+    finally:
+        rclpy.try_shutdown()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,23 @@
+# Message packages published as wheels export the Python headers of the machine they were built on, a path that is not
+# there on any other. repair_python_include_path puts the headers of the Python at hand in its place. A distribution's
+# own ROS 2 exports paths that exist, and is left alone.
+function(repair_python_include_path package)
+  set(target ${package}::${package}__rosidl_generator_py)
+  if(NOT TARGET ${target})
+    return()
+  endif()
+  get_target_property(paths ${target} INTERFACE_INCLUDE_DIRECTORIES)
+  if(NOT paths)
+    return()
+  endif()
+  set(repaired "")
+  foreach(path IN LISTS paths)
+    if(IS_ABSOLUTE "${path}" AND NOT EXISTS "${path}")
+      find_package(Python3 REQUIRED COMPONENTS Interpreter Development.Module)
+      list(APPEND repaired ${Python3_INCLUDE_DIRS})
+    else()
+      list(APPEND repaired "${path}")
+    endif()
+  endforeach()
+  set_target_properties(${target} PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${repaired}")
+endfunction()

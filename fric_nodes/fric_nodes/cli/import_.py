@@ -1,0 +1,41 @@
+"""``fric import``: a recording in another format as a bag."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import JsonOption, RepairOption
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to ``app``."""
+    app.command("import", no_args_is_help=True, epilog="Example: fric import run.csv --map map.yaml --out bags/run")(import_)
+
+
+def import_(
+    file: Annotated[Path, typer.Argument(help=".mat, .csv, .txt, .npz or .parquet")],
+    mapping: Annotated[Path, typer.Option("--map", help="YAML that says where each signal comes from, its unit and a factor.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder of the bag to write; must not exist.")],
+    storage: Annotated[str, typer.Option("--storage", help="mcap or sqlite3.")] = "mcap",
+    repair: RepairOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Turn a recording into a rosbag2 that every other verb reads."""
+    from ..bagio.importing import import_recording, read_mapping
+    from ..bagio.write import write_record
+
+    record = import_recording(file, read_mapping(mapping), repair=repair)
+    write_record(record, out, storage=storage)
+    if as_json:
+        summary = {"bag": str(out), "joint": record.joint, "samples": record.n_samples, "duration": record.duration, "notes": record.notes}
+        typer.echo(json.dumps(summary))
+        return
+    typer.echo(f"{out}: joint '{record.joint}', {record.n_samples} samples, {record.duration:.2f} s at {1 / record.sample_time:.4g} Hz")
+    for note in record.notes:
+        typer.echo(f"- {note}")

@@ -1,0 +1,36 @@
+"""``fric node NODE``: one node of the graph, as ``ros2 run fric_nodes NODE`` would start it."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+
+__all__ = ["NODES", "register"]
+
+NODES = ("plant", "excitation", "identifier", "compensator", "pid", "recorder", "player")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to ``app``."""
+    app.command(
+        "node",
+        no_args_is_help=True,
+        context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+        epilog="Example: fric node plant --ros-args --params-file config/plant.yaml",
+    )(node)
+
+
+def node(
+    context: typer.Context,
+    name: Annotated[str, typer.Argument(help=f"One of {', '.join(NODES)}.")],
+) -> None:
+    """Run one node; what follows its name goes to ROS (--ros-args -p name:=value ...)."""
+    if name not in NODES:
+        raise InputError("fric node", f"no node '{name}'", f"choose one of {', '.join(NODES)}")
+    sys.argv = [name, *context.args]
+    importlib.import_module(f"fric_nodes.nodes.{name}").main()

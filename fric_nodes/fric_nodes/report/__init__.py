@@ -1,0 +1,1 @@
+"""Reports: one self-contained HTML page each, that opens without a network and prints."""
