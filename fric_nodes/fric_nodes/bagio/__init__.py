@@ -8,6 +8,8 @@
 from __future__ import annotations
 
 from .errors import BagError, ImportingError, WriteError
+from .importing import import_recording
+from .mapping import ImportMap, load_mapping
 from .read import BagInfo, Topics, bag_info, iterate_raw, read_record
 from .series import Series, read_series
 from .topics import Raw, Topic
@@ -17,6 +19,7 @@ __all__ = [
     "BagError",
     "BagInfo",
     "BagWriter",
+    "ImportMap",
     "ImportingError",
     "Raw",
     "Series",
@@ -24,7 +27,9 @@ __all__ = [
     "Topics",
     "WriteError",
     "bag_info",
+    "import_recording",
     "iterate_raw",
+    "load_mapping",
     "read_record",
     "read_series",
     "record_metadata",

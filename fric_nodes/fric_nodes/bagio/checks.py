@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +58,9 @@ class Samples:
         return float(self.time_ns[index] - self.time_ns[0]) * 1e-9
 
 
-def pick_topic(where: object, topics: Sequence[Topic], name: str, msgtypes: Sequence[str], key: str) -> tuple[Topic, str | None]:
+def pick_topic(
+    where: object, topics: Sequence[Topic], name: str, msgtypes: Sequence[str], key: str
+) -> tuple[Topic, str | None]:
     """The topic of a bag that a name stands for.
 
     A name that is not there also matches a single topic of one of these types under a namespace.
@@ -83,7 +86,8 @@ def pick_topic(where: object, topics: Sequence[Topic], name: str, msgtypes: Sequ
         fitting = [topic for topic in topics if topic.name.endswith(tail) and topic.msgtype in msgtypes]
         if len(fitting) > 1:
             listed = ", ".join(topic.name for topic in fitting)
-            raise BagError(where, f"no topic {name}, but several that end like it: {listed}", f"choose one with --topic {key}=NAME")
+            problem = f"no topic {name}, but several that end like it: {listed}"
+            raise BagError(where, problem, f"choose one with --topic {key}=NAME")
         if fitting:
             note = f"topic {name} is not in the bag; {fitting[0].name} was read in its place"
     if not fitting:
@@ -95,7 +99,7 @@ def pick_topic(where: object, topics: Sequence[Topic], name: str, msgtypes: Sequ
             )
         listed = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in topics) or "none"
         raise BagError(where, f"no topic {name} in the bag; it holds: {listed}", f"name the topic with --topic {key}=NAME")
-    if fitting[0].count == 0:
+    if fitting[0].n_messages == 0:
         raise BagError(where, f"topic {fitting[0].name} holds no message", "record while the topic is being published")
     return fitting[0], note
 
@@ -153,7 +157,8 @@ def _finite(where: object, samples: Samples, repair: bool) -> None:
         if finite.all():
             continue
         bad = np.flatnonzero(~finite)
-        what = f"{name} is not finite (NaN or inf) at {bad.size} of {signal.size} samples, first at {samples.seconds(bad[0]):.3f} s"
+        first = samples.seconds(bad[0])
+        what = f"{name} is not finite (NaN or inf) at {bad.size} of {signal.size} samples, first at {first:.3f} s"
         if not repair:
             raise BagError(where, what, "drop these samples with --repair, or record again")
         samples.notes.append(f"{what}: dropped")
@@ -170,21 +175,21 @@ def _jumps(where: object, samples: Samples, repair: bool) -> None:
         return
     at = int(np.flatnonzero(far)[0])
     size = float(step[at]) * 1e-9
-    what = f"time jumps by {size:+.3f} s after sample {at} (at {samples.seconds(at):.3f} s), {int(far.sum())} such jump(s) in all"
+    what = f"time jumps by {size:+.3f} s after sample {at} (at {samples.seconds(at):.3f} s), {int(far.sum())} jump(s) in all"
     if not repair:
-        raise BagError(where, what, "keep the longest part in one piece with --repair, or read by time of reception with --time log")
+        remedy = "keep the longest part in one piece with --repair, or read by time of reception with --time log"
+        raise BagError(where, what, remedy)
     edges = [0, *(np.flatnonzero(far) + 1).tolist(), samples.time_ns.size]
     chosen, left_out = _longest_part(samples.time_ns, edges)
     samples.keep(chosen)
-    samples.notes.append(
-        f"{what}: kept the longest part in one piece ({samples.time_ns.size} samples, {samples.seconds(-1):.3f} s), left out {left_out}"
-    )
+    part = f"{samples.time_ns.size} samples, {samples.seconds(-1):.3f} s"
+    samples.notes.append(f"{what}: kept the longest part in one piece ({part}), left out {left_out} samples")
 
 
 def _longest_part(time_ns: Stamps, edges: list[int]) -> tuple[Mask, int]:
     """The longest run of parts that belong together, stray stamps between them taken out; and how many samples are left out."""
     runs: list[list[tuple[int, int]]] = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in pairwise(edges):
         if stop - start < _STRAY:
             continue
         if runs and 0 < time_ns[start] - time_ns[runs[-1][-1][1] - 1] <= _JUMP_NS:
@@ -230,11 +235,12 @@ def _gaps(where: object, samples: Samples, repair: bool) -> None:
         return
     longest = int(gaps[np.argmax(step[gaps])])
     what = (
-        f"{gaps.size} gap(s) in the samples, the longest {float(step[longest]) * 1e-9:.3f} s at {samples.seconds(longest):.3f} s "
-        f"(median step {float(np.median(step)) * 1e-6:.3f} ms)"
+        f"{gaps.size} gap(s) in the samples, the longest {float(step[longest]) * 1e-9:.3f} s "
+        f"at {samples.seconds(longest):.3f} s (median step {float(np.median(step)) * 1e-6:.3f} ms)"
     )
     if not repair:
-        raise BagError(where, what, "keep them, with the samples beside marked as not to be used, with --repair, or record again")
+        remedy = "keep them, with the samples beside marked as not to be used, with --repair, or record again"
+        raise BagError(where, what, remedy)
     samples.valid = samples.valid.copy()
     samples.valid[gaps] = False
     samples.valid[gaps + 1] = False

@@ -55,7 +55,7 @@ class _Column(NamedTuple):
     """Where a numeric field lies in a message: first byte, number of values (None: a scalar), numpy type."""
 
     offset: int
-    count: int | None
+    size: int | None
     dtype: str
 
 
@@ -185,7 +185,7 @@ def decode(messages: Sequence[bytes], msgtype: str, types: Typesdict) -> list[Bl
     blocks: list[Block] = []
     for length in np.unique(lengths):
         rows = np.flatnonzero(lengths == length)
-        same = messages if rows.size == len(messages) else [messages[row] for row in rows]
+        same = messages if rows.size == len(messages) else [messages[row] for row in rows.tolist()]
         table = np.frombuffer(b"".join(same), dtype=np.uint8).reshape(rows.size, int(length))
         blocks += _split(rows, table, msgtype, types)
     return blocks

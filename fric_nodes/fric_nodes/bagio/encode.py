@@ -45,10 +45,10 @@ class _Table:
         self.parts.append(column.reshape(self.n_messages, values.dtype.itemsize))
         self.size += values.dtype.itemsize
 
-    def header(self, stamp_ns: Stamps) -> None:
+    def header(self, stamp_ns: Stamps, frame_id: str = "") -> None:
         self.numbers((stamp_ns // 1_000_000_000).astype(np.int32))
         self.numbers((stamp_ns % 1_000_000_000).astype(np.uint32))
-        self.string("")
+        self.string(frame_id)
 
     def messages(self) -> list[bytes]:
         head = np.broadcast_to(np.frombuffer(_ENCAPSULATION, dtype=np.uint8), (self.n_messages, 4))
@@ -72,19 +72,19 @@ def joint_state_messages(
     return table.messages()
 
 
-def reference_messages(stamp_ns: Stamps, position: Array, velocity: Array, acceleration: Array) -> list[bytes]:
+def reference_messages(stamp_ns: Stamps, joint: str, position: Array, velocity: Array, acceleration: Array) -> list[bytes]:
     """``fric_interfaces/msg/Reference``; all arrays of shape ``(n_messages,)``."""
     table = _Table(stamp_ns.size)
-    table.header(stamp_ns)
+    table.header(stamp_ns, joint)
     for values in (position, velocity, acceleration):
         table.numbers(values)
     return table.messages()
 
 
-def stamped_force_messages(stamp_ns: Stamps, force: Array) -> list[bytes]:
+def stamped_force_messages(stamp_ns: Stamps, joint: str, force: Array) -> list[bytes]:
     """``fric_interfaces/msg/StampedForce``; all arrays of shape ``(n_messages,)``."""
     table = _Table(stamp_ns.size)
-    table.header(stamp_ns)
+    table.header(stamp_ns, joint)
     table.numbers(force)
     return table.messages()
 

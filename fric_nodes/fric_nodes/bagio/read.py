@@ -123,7 +123,8 @@ def read_record(
         topics: names of the topics; the usual ones when None.
         time: ``stamp`` for the stamps of the headers, ``log`` for the time of reception.
         repair: drop or mark what is unusable instead of refusing the recording; what was done is in the notes.
-        start, end: part to keep [s] from the first sample.
+        start: first time to keep [s] from the first sample; None for the first sample.
+        end: last time to keep [s] from the first sample; None for the last sample.
         effort: ``joint_states``, ``command``, or ``auto`` for the joint states where they have it and the command otherwise.
         units: units of position and force; None for those stored with the bag, or else m and N.
 
@@ -195,7 +196,7 @@ class _Reading:
     def _collect(self) -> dict[str, Messages]:
         """Raw messages of every topic that is needed, by its role."""
         have, where = self.source.topics, self.where
-        if not any(topic.count for topic in have):
+        if not any(topic.n_messages for topic in have):
             raise BagError(where, "is empty: it holds no message", "record while the topics are being published")
         roles: dict[str, Topic] = {}
         types = {"joint_states": [JOINT_STATE], "force_command": [FLOAT64, STAMPED_FORCE], "reference": [REFERENCE]}
@@ -238,7 +239,7 @@ class _Reading:
                 f"{self.topics.force_command} ({FLOAT64} or {STAMPED_FORCE})",
                 "record the effort or the force command, or name its topic with --topic force_command=NAME",
             )
-        command = series(self.where, raw["force_command"])
+        command = series(self.where, raw["force_command"], states.joint)
         if own is not None and self.effort_from == "auto":
             self.notes.append(f"effort is zero throughout in {states.topic}: taken from {command.topic}")
         elif self.effort_from == "auto":
@@ -293,7 +294,7 @@ class _Reading:
         for role, messages in raw.items():
             if role in {"joint_states", "force_command"}:
                 continue
-            other = series(self.where, messages)
+            other = series(self.where, messages, states.joint)
             at, times, order = self._clocks(states, other)
             fields = {name: values[order] for name, values in other.fields.items()}
             good = np.isfinite(np.stack(list(fields.values()))).all(axis=0)
@@ -337,7 +338,8 @@ def hermite(at: Stamps, times: Stamps, position: Array, velocity: Array) -> Arra
     Args:
         at: where it is wanted [ns], shape ``(n,)``.
         times: of the samples, increasing [ns], shape ``(m,)``.
-        position, velocity: at these times [m or rad] [m/s or rad/s], shape ``(m,)``.
+        position: at these times [m or rad], shape ``(m,)``.
+        velocity: at these times [m/s or rad/s], shape ``(m,)``.
     """
     if times.size < 2:
         return np.full(at.size, position[0])

@@ -30,7 +30,9 @@ __all__ = ["MAGIC", "McapScan", "mcap_metadata"]
 
 MAGIC = b"\x89MCAP0\r\n"
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _METADATA, _DATA_END, _FOOTER = 0x03, 0x04, 0x05, 0x06, 0x0C, 0x0F, 0x02
-_FORMATS = {"ros2msg": MessageDefinitionFormat.MSG, "ros2idl": MessageDefinitionFormat.IDL, "omgidl": MessageDefinitionFormat.IDL}
+_MSG, _IDL = MessageDefinitionFormat.MSG, MessageDefinitionFormat.IDL
+_FORMATS = {"ros2msg": _MSG, "ros2idl": _IDL, "omgidl": _IDL}
+_UNDEFINED = MessageDefinition(MessageDefinitionFormat.NONE, "")
 
 
 class _Channel(NamedTuple):
@@ -111,7 +113,7 @@ class McapScan:
         merged: dict[tuple[str, str], Topic] = {}
         for number, channel_entry in self._channels.items():
             key = (channel_entry.topic, channel_entry.msgtype)
-            before = merged[key].count if key in merged else 0
+            before = merged[key].n_messages if key in merged else 0
             merged[key] = Topic(*key, before + counts.get(number, 0), channel_entry.definition)
         self.topics = tuple(merged.values())
 
@@ -121,9 +123,7 @@ class McapScan:
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]:
         """Messages in the order they were written; of all topics when ``topics`` is None."""
-        wanted = {
-            number: entry for number, entry in self._channels.items() if topics is None or entry.topic in topics
-        }
+        wanted = {number: entry for number, entry in self._channels.items() if topics is None or entry.topic in topics}
         for number, log_time, data in self._messages([]):
             entry = wanted.get(number)
             if entry is not None:
@@ -167,18 +167,19 @@ class McapScan:
                 name, at = _string(content, 2)
                 encoding, at = _string(content, at)
                 text, at = _string(content, at)
-                self._schemas[number] = (name, MessageDefinition(_FORMATS.get(encoding, MessageDefinitionFormat.NONE), text))
+                known = _FORMATS.get(encoding, MessageDefinitionFormat.NONE)
+                self._schemas[number] = (name, MessageDefinition(known, text))
             else:
                 number, schema = struct.unpack_from("<HH", content)
                 topic, _ = _string(content, 4)
-                msgtype, definition = self._schemas.get(schema, ("unknown", MessageDefinition(MessageDefinitionFormat.NONE, "")))
+                msgtype, definition = self._schemas.get(schema, ("unknown", _UNDEFINED))
                 self._channels[number] = _Channel(topic, msgtype, definition)
         except struct.error:
             return  # a record that does not hold what it should is as good as absent
 
 
 def mcap_metadata(path: Path, name: str) -> dict[str, str]:
-    """Key and value pairs of the metadata record ``name``, looked for among the first records of the file; empty without one."""
+    """Key and value pairs of the metadata record ``name`` among the first records of the file; empty without one."""
     with path.open("rb") as file:
         head = file.read(1 << 16)
     for count, (opcode, start, stop, complete) in enumerate(_records(head, len(MAGIC))):

@@ -87,7 +87,8 @@ def series(where: object, messages: Messages, joint: str | None = None, usual: s
     Args:
         where: the bag, for messages.
         messages: raw messages of the topic.
-        joint: which joint of joint states; None for the only one.
+        joint: which joint of joint states; None for the only one. Of the stamped types, messages whose ``frame_id`` names this
+            joint are taken, where there are such.
         usual: which joint to take when there are several and none is asked for.
 
     Raises:
@@ -98,7 +99,9 @@ def series(where: object, messages: Messages, joint: str | None = None, usual: s
         blocks = decode(messages.data, topic.msgtype, type_fields(topic.msgtype, topic.definition))
     except KeyError as error:
         raise BagError(
-            where, f"the bag does not define the type {topic.msgtype} of topic {topic.name}", "record it with a recorder that does"
+            where,
+            f"the bag does not define the type {topic.msgtype} of topic {topic.name}",
+            "record it with a recorder that does",
         ) from error
     except DecodeError as error:
         raise BagError(
@@ -109,11 +112,18 @@ def series(where: object, messages: Messages, joint: str | None = None, usual: s
     wanted = _FIELDS.get(topic.msgtype) or _scalar_fields(blocks)
     if any(key not in block.numbers for key in wanted.values() for block in blocks):
         raise BagError(where, f"{topic.msgtype} in the bag lacks one of the fields {', '.join(wanted)}", "record it anew")
-    fields = {name: np.empty(messages.log_ns.size) for name in wanted}
+    named = [block for block in blocks if joint is not None and block.strings.get("header.frame_id") == joint]
+    blocks = named or blocks
+    fields = {name: np.full(messages.log_ns.size, np.nan) for name in wanted}
     for block in blocks:
         for name, key in wanted.items():
             fields[name][block.rows] = block.numbers[key]
-    return Series(topic.name, topic.msgtype, _stamps(blocks, messages.log_ns.size), messages.log_ns, fields)
+    stamp_ns, log_ns = _stamps(blocks, messages.log_ns.size), messages.log_ns
+    if named:
+        rows = np.sort(np.concatenate([block.rows for block in named]))
+        fields = {name: values[rows] for name, values in fields.items()}
+        stamp_ns, log_ns = None if stamp_ns is None else stamp_ns[rows], log_ns[rows]
+    return Series(topic.name, topic.msgtype, stamp_ns, log_ns, fields)
 
 
 def read_series(path: str | Path, topic: str, joint: str | None = None) -> Series:
@@ -166,7 +176,9 @@ def _joint_series(where: object, messages: Messages, blocks: Sequence[Block], jo
     topic, n_messages = messages.topic, messages.log_ns.size
     joints = sorted({name for block in blocks for name in _names(block)})
     if not joints:
-        raise BagError(where, f"joint states on {topic.name} hold no joint", "choose another topic with --topic joint_states=NAME")
+        raise BagError(
+            where, f"joint states on {topic.name} hold no joint", "choose another topic with --topic joint_states=NAME"
+        )
     chosen = pick_joint(where, joints, joint, usual)
     stamp_ns = _stamps(blocks, n_messages)
     assert stamp_ns is not None  # joint states have a header
@@ -186,10 +198,10 @@ def _joint_series(where: object, messages: Messages, blocks: Sequence[Block], jo
                 absent[name] += block.rows.size
             else:
                 at = (messages.log_ns[block.rows[0]] - messages.log_ns[0]) * 1e-9
+                where_in = f"in {block.rows.size} messages of {topic.name}, first at {at:.3f} s"
                 raise BagError(
                     where,
-                    f"{name} has {values.shape[1]} values for {len(names)} joints in {block.rows.size} messages of {topic.name}, "
-                    f"first at {at:.3f} s",
+                    f"{name} has {values.shape[1]} values for {len(names)} joints {where_in}",
                     "record with a publisher that gives one value per joint",
                 )
     total = int(has.sum())
@@ -201,7 +213,9 @@ def _joint_series(where: object, messages: Messages, blocks: Sequence[Block], jo
                 notes.append(f"velocity left out: it is missing in {absent[name]} of {total} messages of {topic.name}")
                 continue
             raise BagError(
-                where, f"{name} is missing in {absent[name]} of {total} messages of {topic.name}", "record with one publisher only"
+                where,
+                f"{name} is missing in {absent[name]} of {total} messages of {topic.name}",
+                "record with one publisher only",
             )
         if not absent[name]:
             fields[name] = columns[name][has]

@@ -76,6 +76,7 @@ class Source:
         self._stack = ExitStack()
         self._reader: Reader | None = None
         self._scans: list[McapScan | SqliteScan] = []
+        self._refusal = ""  # why the library does not read it
         files = self._find()
         try:
             if recover or not self._open_library(files):
@@ -148,7 +149,7 @@ class Source:
             reader = Reader(target)
             reader.open()
         except _DAMAGE as error:
-            self.notes.append(f"read record by record, because its index is not usable ({str(error).rstrip('.')})")
+            self._refusal = str(error).rstrip(".")
             return False
         self._stack.callback(reader.close)
         if not in_order and _kind(target) == "sqlite3":
@@ -157,7 +158,7 @@ class Source:
         self._reader = reader
         merged: dict[tuple[str, str], Topic] = {}
         for x in reader.connections:
-            before = merged[x.topic, x.msgtype].count if (x.topic, x.msgtype) in merged else 0
+            before = merged[x.topic, x.msgtype].n_messages if (x.topic, x.msgtype) in merged else 0
             merged[x.topic, x.msgtype] = Topic(x.topic, x.msgtype, before + x.msgcount, x.msgdef)
         self.topics = tuple(merged.values())
         self.storage = _kind(files[0]) or ""
@@ -180,12 +181,14 @@ class Source:
             self.notes += [f"{file.name}: {problem}" for problem in scan.damage]
             for topic in scan.topics:
                 before = merged.get((topic.name, topic.msgtype))
-                count = topic.count + (before.count if before else 0)
-                merged[topic.name, topic.msgtype] = topic._replace(count=count)
+                count = topic.n_messages + (before.n_messages if before else 0)
+                merged[topic.name, topic.msgtype] = topic._replace(n_messages=count)
             self.storage = kind or ""
             self.custom = self.custom or self._stored_custom(plain)
+        if self._refusal and not any(scan.damage for scan in self._scans):
+            self.notes.append(f"read record by record, because its index is not usable ({self._refusal})")
         self.topics = tuple(merged.values())
-        if not any(topic.count for topic in self.topics):
+        if not any(topic.n_messages for topic in self.topics):
             raise BagError(self.path, "holds no complete message", "it is truncated beyond use or empty: record again")
 
     def _stored_custom(self, file: Path) -> dict[str, str]:

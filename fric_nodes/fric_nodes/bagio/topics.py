@@ -14,7 +14,7 @@ class Topic(NamedTuple):
 
     name: str
     msgtype: str
-    count: int
+    n_messages: int
     definition: MessageDefinition
 
 

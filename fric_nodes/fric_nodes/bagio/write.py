@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import shutil
 import sqlite3
 import struct
@@ -276,8 +275,8 @@ def write_record(
 ) -> Path:
     """Write a record as a bag: joint states, and the reference and further signals where there are any.
 
-    The bag appears under its name when it is complete, or not at all. Stamps and times of reception are the record's time on top
-    of ``start_time_ns``, so the same record gives the same bag.
+    The bag appears under its name when it is complete, or not at all. Stamps and times of reception are the record's time on
+    top of ``start_time_ns``, so the same record gives the same bag.
 
     Args:
         record: what to write.
@@ -307,7 +306,9 @@ def write_record(
         custom = {**record_metadata(record), **(metadata or {})}
         with BagWriter(work / path.name, storage=storage, compression=compression, metadata=custom, flush_period=None) as bag:
             _write_messages(bag, record, stamps)
-        os.rename(work / path.name, path)
+        (work / path.name).rename(path)
+    except WriteError as error:  # under its own name, not that of the temporary folder
+        raise WriteError(path, error.problem, error.remedy) from error
     except OSError as error:
         raise WriteError(path, f"cannot be created ({error})", "choose a folder that can be written to") from error
     finally:
@@ -325,7 +326,7 @@ def _write_messages(bag: BagWriter, record: Record, stamps: Stamps) -> None:
     if record.reference is not None:
         velocity = np.gradient(record.reference, record.time)
         acceleration = np.gradient(velocity, record.time)
-        columns["/reference"] = (REFERENCE, reference_messages(stamps, record.reference, velocity, acceleration))
+        columns["/reference"] = (REFERENCE, reference_messages(stamps, record.joint, record.reference, velocity, acceleration))
     for name, signal in record.extra.items():
         columns[f"/{name}"] = (FLOAT64, float64_messages(signal))
     for topic, (msgtype, _) in columns.items():

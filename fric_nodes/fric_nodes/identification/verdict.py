@@ -61,7 +61,7 @@ def collinear(model: Model, columns: Array, free: FreeParameters, use: Mask) -> 
             basis.append(rest / left)
             spans.append(name)
             continue
-        others = [spans[k] for k in np.argsort(shares)[::-1][:2] if shares[k] > 0.1]
+        others = [spans[k] for k in np.argsort(shares)[::-1][:2] if shares[k] > 0.3]
         twins.append(Twin(name, _twin_message(model, name, others, model.value(name))))
     return twins
 

@@ -8,7 +8,7 @@ on its own thread, and one message then costs about 2 us to take. The queue must
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 __all__ = ["BulkSubscription", "Taken", "message_class", "offered_qos"]
 
@@ -112,13 +113,13 @@ class BulkSubscription:
         self._node.destroy_subscription(self._subscription)
 
 
-def offered_qos(node: Node, topic: str, depth: int) -> QoSProfile:
-    """The strictest quality of service with which every present publisher of ``topic`` can be received.
+def offered_qos(publishers: Iterable[TopicEndpointInfo], depth: int) -> QoSProfile:
+    """The strictest quality of service with which every one of ``publishers`` can be received.
 
     Reliable and transient-local are asked for only where all publishers offer them, since asking for more than is offered means
     to receive nothing.
     """
-    offers = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
+    offers = [publisher.qos_profile for publisher in publishers]
     reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
     latched = bool(offers) and all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
     return QoSProfile(

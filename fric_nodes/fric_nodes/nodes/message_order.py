@@ -43,6 +43,7 @@ class TopicIntake:
         stamped: the message begins with a header, so a repetition can be recognised.
         follows_clock: its stamps are of the clock of the samples (False for diagnostics).
         received: messages taken from the middleware.
+        written: messages handed on to the bag.
         repeated: retransmissions, which are not written.
         lost: messages that the publisher sent and that never came, by the gaps in its sequence numbers.
     """
@@ -51,6 +52,7 @@ class TopicIntake:
     stamped: bool
     follows_clock: bool
     received: int = 0
+    written: int = 0
     repeated: int = 0
     lost: int = 0
     last_sequence: int = 0
@@ -93,9 +95,10 @@ class ReceiveOrder:
         if topic.stamped:
             stamp = header_stamp(payload)
             # Stamps that nobody fills are all 0, and then two equal messages are two messages.
-            if stamp > 0 and topic.is_repetition(payload, stamp):
-                return
-            topic.last_stamp = stamp
+            if stamp > 0:
+                if topic.is_repetition(payload, stamp):
+                    return
+                topic.last_stamp = stamp
         self._waiting.append((received, index, payload))
 
     def release(self, before: int | None) -> list[Message]:

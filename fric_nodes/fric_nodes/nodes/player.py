@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,197 @@ from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rosbags.interfaces import Qos
 from rosgraph_msgs.msg import Clock
 
 from ..bagio.errors import BagError
 from ..bagio.read import bag_info, iterate_raw
-from ..bagio.topics import Raw
 from ..errors import InputError
 from .bulk import message_class
-from .playback import Due, Pace, schedule
+from .playback import Due, Pace, recorded_qos, schedule
 
-__all__ = ["PlayerNode", "main"]
+__all__ = ["NoSubscribersError", "PlayerNode", "main"]
+
+_FRICTION_MODEL = "fric_interfaces/msg/FrictionModel"
+_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+_DEPTH = 1000  # messages kept for a slow reliable subscriber
+_CLOCK_TICK = 0.01  # [s] of the recording between two messages on /clock
+_SETTLE_LIMIT = 4.0  # [s]; Fast DDS asks for acknowledgements every 3 s when nothing else is published
+_BURST = 16  # messages published at once when there is no pace to keep; small against the queues of subscribers
+
+
+class NoSubscribersError(InputError):
+    """Nobody subscribed to what is to be played."""
+
+
+class PlayerNode(Node):
+    """Publishes the messages of a bag; nothing happens before :meth:`play`.
+
+    Raises:
+        BagError: not a bag, damaged beyond use, or without a topic that was asked for.
+    """
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__("player", **node_options)
+        declare = self.declare_parameter
+        self._bag = Path(declare("bag", "").value)
+        self._rate: float = declare("rate", 1.0).value
+        self._start: float = declare("start", 0.0).value
+        self._end: float = declare("end", 0.0).value
+        self._loop: bool = declare("loop", False).value
+        topics = [name for name in declare("topics", [""]).value if name]
+        self._by_stamp = declare("time_source", "log").value == "stamp"
+        self._subscribers: int = declare("wait_for_subscribers", 0).value
+        self._patience: float = declare("wait_timeout", 10.0).value
+        self._pause: float = declare("pause", 0.002).value
+        self.stop = threading.Event()
+        """Set it to end the playing early."""
+        self.published = 0
+        """Messages published so far."""
+        self._clock = self.create_publisher(Clock, "/clock", 10) if declare("clock", False).value else None
+        self._stamped: set[str] = set()
+        self._publishers_of: dict[str, Publisher] = {}
+        self._total = 0
+        self._open(topics)
+
+    def _open(self, topics: list[str]) -> None:
+        """Make a publisher for every topic to be played whose type is installed."""
+        known = {topic.name: topic for topic in bag_info(self._bag).topics}
+        for name in topics:
+            if name not in known:
+                raise BagError(self._bag, f"no topic {name} in the bag; it holds: {', '.join(known)}", "choose among these")
+        offered = recorded_qos(self._bag)
+        for name in topics or known:
+            topic = known[name]
+            try:
+                kind = message_class(topic.msgtype)
+            except ImportError as error:
+                self.get_logger().warning(f"{name}: not played, its type {topic.msgtype} is not installed ({error})")
+                continue
+            if next(iter(kind.get_fields_and_field_types().values()), "") == "std_msgs/Header":
+                self._stamped.add(topic.msgtype)
+            self._publishers_of[name] = self.create_publisher(kind, name, _playing_qos(offered.get(name), topic.msgtype))
+            self._total += topic.count
+
+    def play(self) -> bool:
+        """Publish the recording, as often as was asked for; True when it was published to its end.
+
+        Raises:
+            BagError: the bag turns out to be damaged on the way.
+            NoSubscribersError: nobody subscribed in time.
+        """
+        self._wait_for_subscribers()
+        while True:
+            pace = Pace(self._rate, self.stop) if self._rate > 0 else None
+            messages = schedule(
+                iterate_raw(self._bag, list(self._publishers_of)),
+                stamped=self._stamped - {_DIAGNOSTICS} if self._by_stamp else (),
+                start=self._start,
+                end=self._end if self._end > 0 else None,
+                tick=_CLOCK_TICK if self._clock else None,
+            )
+            for due in messages:
+                if not (pace.wait(due.time_ns) if pace else self._throttle()):
+                    return False
+                self._publish(due)
+            self._settle()
+            late = f", at most {pace.worst_delay * 1e3:.1f} ms late" if pace else ""
+            self.get_logger().info(f"played {self.published} messages{late}")
+            if not self._loop:
+                return True
+            self.published = 0
+
+    def _publish(self, due: Due) -> None:
+        if due.message is not None:
+            self._publishers_of[due.message.topic].publish(due.message.data)
+            self.published += 1
+            self._progress()
+        elif self._clock is not None:
+            seconds, nanoseconds = divmod(due.time_ns, 1_000_000_000)
+            self._clock.publish(Clock(clock=Time(sec=seconds, nanosec=nanoseconds)))
+
+    def _progress(self) -> None:
+        if self._total and self.published * 10 // self._total != (self.published - 1) * 10 // self._total:
+            self.get_logger().info(f"{100 * self.published // self._total} % ({self.published} of {self._total} messages)")
+
+    def _throttle(self) -> bool:
+        """Without a pace to keep, rest after every burst, so that subscribers can empty their queues; False when told to stop.
+
+        Waiting for acknowledgements instead would be slower and no safer: they say that a message is in the subscriber's queue,
+        not that it was taken out, and the middleware may ask for them as seldom as every 3 s.
+        """
+        if self.published % _BURST == 0 and self.published:
+            return not self.stop.wait(self._pause)
+        return not self.stop.is_set()
+
+    def _settle(self) -> None:
+        """Wait until every reliable subscriber has acknowledged what was published, so that leaving loses nothing."""
+        deadline = time.monotonic() + _SETTLE_LIMIT
+        for publisher in self._publishers_of.values():
+            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+
+    def _wait_for_subscribers(self) -> None:
+        def count() -> int:
+            return sum(publisher.get_subscription_count() for publisher in self._publishers_of.values())
+
+        deadline = time.monotonic() + self._patience
+        while count() < self._subscribers and not self.stop.wait(0.02):
+            if time.monotonic() > deadline:
+                raise NoSubscribersError(
+                    self._bag,
+                    f"{count()} of {self._subscribers} subscriptions within {self._patience:g} s",
+                    "start the subscribers first, or raise wait_timeout",
+                )
+
+
+def _playing_qos(recorded: Qos | None, msgtype: str) -> QoSProfile:
+    """Quality of service as recorded; where the bag does not say, reliable, and latched for a friction model."""
+    if recorded is None:
+        latched, reliable = msgtype == _FRICTION_MODEL, True
+    else:
+        latched, reliable = recorded.durability.name == "TRANSIENT_LOCAL", recorded.reliability.name != "BEST_EFFORT"
+    return QoSProfile(
+        depth=1 if latched and recorded is None else _DEPTH,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def main(args: list[str] | None = None) -> None:
+    """Play a bag to its end; exit status 0 also when stopped by SIGINT or SIGTERM, 2 when the bag cannot be played."""
+    refusal: list[InputError] = []
+    # The signals only ask for an end (see recorder): the last messages are then still delivered.
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = PlayerNode()
+
+        def work() -> None:
+            try:
+                node.play()
+            except InputError as error:
+                refusal.append(error)
+
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: node.stop.set())
+        # The main thread serves parameters and services, so that the pace does not depend on them.
+        playing = threading.Thread(target=work, name="play")
+        playing.start()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        while playing.is_alive():
+            executor.spin_once(timeout_sec=0.1)
+        playing.join()
+        node.destroy_node()
+    except InputError as error:
+        refusal.append(error)
+    finally:
+        rclpy.try_shutdown()
+    if refusal:
+        sys.stderr.write(f"player: {refusal[0]}\n")
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

@@ -6,16 +6,19 @@ import signal
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..bagio.errors import WriteError
 from ..bagio.write import BagWriter
@@ -69,45 +72,50 @@ class RecorderNode(Node):
         self._order = StampOrder(self._topics, self._warn_restart) if self._by_stamp else ReceiveOrder(self._topics)
         self._bulk: list[BulkSubscription] = []
         self._refused: set[str] = set()
-        self._written = self._written_before = 0
+        self._written_before = 0
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", 10)
-        self.create_timer(drain_period, self._drain)
-        self.create_timer(0.05, self._discover)
-        self.create_timer(1.0, self._report)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # the node's own clock may be simulated, and stand still
+        for period, work in ((drain_period, self.drain), (0.05, self.discover), (1.0, self.report)):
+            self.create_timer(period, work, clock=steady)
         self.get_logger().info(f"recording into {bag}")
 
-    def _discover(self) -> None:
+    def discover(self) -> None:
         """Subscribe to every wanted topic whose type has become known, and follow a change of its quality of service."""
         known = {subscription.topic: at for at, subscription in enumerate(self._bulk)}
-        for topic, types in self.get_topic_names_and_types():
-            wanted = topic in self._wanted or (self._all_topics and "/_" not in topic)
-            if not wanted or topic in self._refused or not self.count_publishers(topic):
+        for topic, _ in self.get_topic_names_and_types():
+            if topic in self._refused or not (topic in self._wanted or (self._all_topics and "/_" not in topic)):
                 continue
-            qos = offered_qos(self, topic, self._depth)
+            # The graph's own list of types also holds those that are only subscribed to.
+            publishers = self.get_publishers_info_by_topic(topic)
             at = known.get(topic)
             if at is None:
-                self._subscribe(topic, types, qos)
-            elif not _receives_as_well(self._bulk[at].qos, qos):
+                if publishers:
+                    self._subscribe(topic, publishers)
+                continue
+            present = self._bulk[at]
+            qos = offered_qos([p for p in publishers if p.topic_type == present.msgtype], self._depth)
+            if not _receives_as_well(present.qos, qos):
                 # A publisher with less to offer has joined, from which the present subscription would receive nothing.
                 self._take(at)
-                old = self._bulk[at]
-                self._bulk[at] = BulkSubscription(self, old.msgtype, topic, qos)
-                old.destroy()
+                self._bulk[at] = BulkSubscription(self, present.msgtype, topic, qos)
+                present.destroy()
 
-    def _subscribe(self, topic: str, types: Sequence[str], qos: QoSProfile) -> None:
+    def _subscribe(self, topic: str, publishers: Sequence[TopicEndpointInfo]) -> None:
+        msgtype = publishers[0].topic_type
+        if any(publisher.topic_type != msgtype for publisher in publishers):
+            self.get_logger().warning(f"{topic}: published with several types; only {msgtype} is recorded")
         try:
-            if len(types) > 1:
-                self.get_logger().warning(f"{topic}: published as {', '.join(types)}; only {types[0]} is recorded")
-            first = next(iter(message_class(types[0]).get_fields_and_field_types().values()), "")
-            self._writer.topic(topic, types[0])
-            self._bulk.append(BulkSubscription(self, types[0], topic, qos))
+            first = next(iter(message_class(msgtype).get_fields_and_field_types().values()), "")
+            self._writer.topic(topic, msgtype)
+            qos = offered_qos([p for p in publishers if p.topic_type == msgtype], self._depth)
+            self._bulk.append(BulkSubscription(self, msgtype, topic, qos))
         except (ImportError, WriteError) as error:
             self._refused.add(topic)
-            self.get_logger().warning(f"{topic}: not recorded, its type {types[0]} is not installed ({error})")
+            self.get_logger().warning(f"{topic}: not recorded, its type {msgtype} is not installed ({error})")
             return
         stamped = first == "std_msgs/Header"
-        self._topics.append(TopicIntake(topic, stamped, follows_clock=stamped and types[0] != _DIAGNOSTICS))
-        self.get_logger().info(f"recording {topic} [{types[0]}]")
+        self._topics.append(TopicIntake(topic, stamped, follows_clock=stamped and msgtype != _DIAGNOSTICS))
+        self.get_logger().info(f"recording {topic} [{msgtype}]")
 
     def _take(self, at: int) -> None:
         """Move what topic number ``at`` has received from the middleware's queue into the order."""
@@ -117,7 +125,7 @@ class RecorderNode(Node):
             intake.count(sequence, one_publisher)
             add(at, payload, received)
 
-    def _drain(self) -> None:
+    def drain(self) -> None:
         before = time.time_ns()  # the clock on which the middleware stamps reception
         for at in range(len(self._topics)):
             self._take(at)
@@ -125,15 +133,20 @@ class RecorderNode(Node):
 
     def _write(self, before: int | None) -> None:
         write, topics = self._writer.write, self._topics
-        ready = self._order.release(before)
-        for log_time, at, payload in ready:
-            write(topics[at].name, log_time, payload)
-        self._written += len(ready)
+        for log_time, at, payload in self._order.release(before):
+            topic = topics[at]
+            write(topic.name, log_time, payload)
+            topic.written += 1
+
+    @property
+    def written(self) -> Counter[str]:
+        """Messages written so far, by topic."""
+        return Counter({topic.name: topic.written for topic in self._topics})
 
     def _warn_restart(self, topic: str) -> None:
         self.get_logger().warning(f"{topic}: stamps start again from an earlier time; the bag goes on, in a part of its own")
 
-    def _report(self) -> None:
+    def report(self) -> None:
         lost = sum(topic.lost for topic in self._topics)
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if lost else DiagnosticStatus.OK,
@@ -141,26 +154,27 @@ class RecorderNode(Node):
             message=f"{lost} messages lost" if lost else "no message lost",
             hardware_id="",
         )
+        written = sum(self.written.values())
         values: dict[str, object] = {
-            "written": self._written,
-            "rate [1/s]": self._written - self._written_before,
+            "written": written,
+            "rate [1/s]": written - self._written_before,
             "lost": lost,
         }
         for topic in self._topics:
             values[topic.name] = f"{topic.received} received, {topic.repeated} repeated, {topic.lost} lost"
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
-        self._written_before = self._written
+        self._written_before = written
         array = DiagnosticArray(status=[status])
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
 
     def close(self) -> None:
         """Take what is still in the queues, write it all and close the bag."""
-        self._drain()
+        self.drain()
         self._write(None)
         self._writer.close()
         lost = sum(topic.lost for topic in self._topics)
-        self.get_logger().info(f"recorded {self._written} messages, {lost} lost")
+        self.get_logger().info(f"recorded {sum(self.written.values())} messages, {lost} lost")
 
 
 def _receives_as_well(present: QoSProfile, offered: QoSProfile) -> bool:
@@ -185,7 +199,7 @@ def main(args: list[str] | None = None) -> None:
         node.close()
         node.destroy_node()
     except InputError as error:
-        print(f"recorder: {error}", file=sys.stderr)
+        sys.stderr.write(f"recorder: {error}\n")
         sys.exit(2)
     finally:
         rclpy.try_shutdown()

@@ -1,0 +1,11 @@
+"""Benchmarks that a user can run: ``fric bench``. One file each, with a constant ``BENCHMARK``; every number of the README comes from here."""
+
+from __future__ import annotations
+
+from ..registry import discover
+from .benchmark import Benchmark
+
+__all__ = ["BENCHMARKS"]
+
+BENCHMARKS: dict[str, Benchmark] = {benchmark.id: benchmark for benchmark in discover(__name__, "BENCHMARK", Benchmark)}
+"""Every benchmark by its id."""

@@ -1,0 +1,51 @@
+"""``fric bench``: measure, on this machine, the figures that the README states."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from .options import JsonOption, progress
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to ``app``."""
+    app.command("bench", epilog="Example: fric bench recordings fitting")(bench)
+
+
+def bench(
+    names: Annotated[list[str] | None, typer.Argument(help="Which benchmarks; all when none is named.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure speed on this machine; exit status 1 when a goal is missed."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from ..bench import BENCHMARKS
+
+    chosen = names or list(BENCHMARKS)
+    for name in chosen:
+        if name not in BENCHMARKS:
+            raise InputError("fric bench", f"no benchmark '{name}'", f"choose from {', '.join(BENCHMARKS)}")
+    figures = []
+    for name in chosen:
+        progress(f"measuring {BENCHMARKS[name].title}")
+        figures += BENCHMARKS[name].run()
+    if as_json:
+        typer.echo(json.dumps([{"name": f.name, "value": f.value, "unit": f.unit, "goal": f.goal, "reached": f.reached} for f in figures]))
+    else:
+        table = Table(box=None, pad_edge=False)
+        table.add_column("figure")
+        table.add_column("measured", justify="right")
+        table.add_column("goal")
+        for figure in figures:
+            mark = "" if figure.reached is None else " reached" if figure.reached else " missed"
+            table.add_row(figure.name, f"{figure.value:.4g} {figure.unit}", f"{figure.goal} {figure.unit}{mark}" if figure.goal else "")
+        Console(highlight=False).print(table)
+    if any(figure.reached is False for figure in figures):
+        raise typer.Exit(1)

@@ -1,0 +1,176 @@
+"""ROS parameters from one declaration each: type, unit, documentation, range or choices, default, and whether it may be set later.
+
+The declaration produces the ParameterDescriptor that ``ros2 param describe`` shows, and the check that every later change passes.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+
+from ..errors import InputError
+from ..parameter import Parameter
+from ..record import Units
+
+__all__ = ["NodeParameter", "NodeParameterError", "Settings", "from_declaration"]
+
+_TYPE_NAMES: Mapping[type, str] = {bool: "bool", int: "integer", float: "double (write a decimal point)", str: "string", list: "array"}
+
+
+class NodeParameterError(InputError):
+    """A node parameter with a value that can't be used."""
+
+
+@dataclass(frozen=True)
+class NodeParameter:
+    """One ROS parameter of a node.
+
+    Attributes:
+        name: as on the command line.
+        default: value when none is given; its type is the parameter's type.
+        doc: what it is, one sentence.
+        unit: ``""`` for a text, a flag or a pure number.
+        lower: smallest value allowed.
+        upper: largest value allowed.
+        choices: the texts allowed; empty allows any.
+        settable: True when it may be changed while the node runs.
+    """
+
+    name: str
+    default: bool | int | float | str | list[str]
+    doc: str
+    unit: str = ""
+    lower: float = -math.inf
+    upper: float = math.inf
+    choices: tuple[str, ...] = ()
+    settable: bool = False
+
+    def descriptor(self) -> ParameterDescriptor:
+        """What the node tells about the parameter."""
+        described = ParameterDescriptor(name=self.name, read_only=not self.settable)
+        described.description = f"{self.doc} [{self.unit}]" if self.unit else self.doc
+        if self.choices:
+            described.additional_constraints = f"one of {', '.join(self.choices)}"
+        bounded = self.lower > -math.inf or self.upper < math.inf
+        if bounded and isinstance(self.default, float):
+            # The range message knows no infinity, so an open side gets the largest number there is.
+            most = sys.float_info.max
+            described.floating_point_range = [FloatingPointRange(from_value=max(self.lower, -most), to_value=min(self.upper, most))]
+        elif bounded and isinstance(self.default, int):
+            most_int = 2**63 - 1
+            lower, upper = max(self.lower, -most_int), min(self.upper, most_int)
+            described.integer_range = [IntegerRange(from_value=int(lower), to_value=int(upper), step=1)]
+        return described
+
+    def refusal(self, value: Any) -> str | None:
+        """Why ``value`` can't be used, or None when it can."""
+        if isinstance(value, float) and not math.isfinite(value):
+            return f"{self.name} is {value}, not a finite number"
+        if isinstance(value, (int, float)) and not self.lower <= value <= self.upper:
+            unit = f" {self.unit}" if self.unit else ""
+            return f"{self.name} is {value:g}, must lie in [{self.lower:g}, {self.upper:g}]{unit}"
+        if self.choices:
+            for given in value if isinstance(value, list) else [value]:
+                if given not in self.choices:
+                    return f"{self.name} is '{given}', must be one of {', '.join(self.choices)}"
+        return None
+
+
+def from_declaration(parameter: Parameter, prefix: str, units: Units, settable: bool = False) -> NodeParameter:
+    """The ROS parameter ``prefix.name`` for a parameter of the core, which must have a default.
+
+    Raises:
+        ValueError: the parameter has no default.
+    """
+    if parameter.default is None:
+        raise ValueError(f"{prefix}.{parameter.name} has no default")
+    lower = max(parameter.lower, sys.float_info.min) if parameter.positive else parameter.lower
+    unit = parameter.unit(units)
+    return NodeParameter(
+        f"{prefix}.{parameter.name}", float(parameter.default), parameter.doc, "" if unit == "1" else unit, lower, parameter.upper,
+        settable=settable,
+    )  # fmt: skip
+
+
+class Settings:
+    """The declared parameters of a node, with their present values.
+
+    Args:
+        node: whose parameters they are.
+        declarations: all of them.
+
+    Raises:
+        NodeParameterError: a value given at the start can't be used.
+    """
+
+    def __init__(self, node: Node, declarations: Iterable[NodeParameter]) -> None:
+        self._declarations = {declaration.name: declaration for declaration in declarations}
+        self._listeners: list[Callable[[set[str]], None]] = []
+        self._values: dict[str, Any] = {}
+        for declaration in self._declarations.values():
+            self._values[declaration.name] = self._declared(node, declaration)
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._adopt)
+
+    @staticmethod
+    def _declared(node: Node, declaration: NodeParameter) -> Any:
+        where = f"parameter '{declaration.name}' of {node.get_fully_qualified_name()}"
+        wanted = _TYPE_NAMES[type(declaration.default)]
+        try:
+            value = node.declare_parameter(declaration.name, declaration.default, declaration.descriptor()).value
+        except InvalidParameterTypeException:
+            raise NodeParameterError(where, "has the wrong type", f"give a {wanted}: {declaration.doc}") from None
+        except InvalidParameterValueException as error:
+            refusal = declaration.refusal(error.args[1]) if len(error.args) > 1 else None
+            limits = f"give a value in [{declaration.lower:g}, {declaration.upper:g}]: {declaration.doc}"
+            raise NodeParameterError(where, refusal or "is out of range", limits) from None
+        refusal = declaration.refusal(value)
+        if refusal is not None:
+            raise NodeParameterError(where, refusal, declaration.doc)
+        return value
+
+    def _check(self, changes: list[RosParameter]) -> SetParametersResult:
+        for change in changes:
+            declaration = self._declarations.get(change.name)
+            refusal = declaration.refusal(change.value) if declaration is not None else None
+            if refusal is not None:
+                return SetParametersResult(successful=False, reason=refusal)
+        return SetParametersResult(successful=True)
+
+    def _adopt(self, changes: list[RosParameter]) -> None:
+        changed = {change.name for change in changes if change.name in self._declarations}
+        self._values.update({change.name: change.value for change in changes if change.name in changed})
+        for listener in self._listeners:
+            listener(changed)
+
+    def when_changed(self, listener: Callable[[set[str]], None]) -> None:
+        """Call ``listener`` with the names of the parameters that have been set."""
+        self._listeners.append(listener)
+
+    def number(self, name: str) -> float:
+        """Value of a parameter of type double."""
+        return float(self._values[name])
+
+    def integer(self, name: str) -> int:
+        """Value of a parameter of type integer."""
+        return int(self._values[name])
+
+    def flag(self, name: str) -> bool:
+        """Value of a parameter of type bool."""
+        return bool(self._values[name])
+
+    def text(self, name: str) -> str:
+        """Value of a parameter of type string."""
+        return str(self._values[name])
+
+    def texts(self, name: str) -> list[str]:
+        """Value of a parameter of type string array."""
+        return [str(value) for value in self._values[name] or [] if value != ""]

@@ -1,0 +1,138 @@
+"""What the tests of nodes share: a graph of their own for every test, over the real middleware, without launch files."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+NodeT = TypeVar("NodeT", bound=Node)
+LIMIT = 30.0  # [s] generous: a wait ends when its condition holds, and the machine may be busy
+_DOMAINS = range(1, 101)  # above that, the ports of DDS fall into those that the system gives away
+
+
+class Graph:
+    """Nodes, executors and processes in one ROS domain that nothing else on this machine uses meanwhile."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._lock, self.domain = _free_domain()
+        self.environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "ROS_LOG_DIR": str(folder / "log")}
+        self._contexts: list[Context] = []
+        self._executors: list[tuple[Executor, threading.Thread]] = []
+        self._processes: list[subprocess.Popen[str]] = []
+        self._nodes: list[Node] = []
+
+    def context(self, *args: str) -> Context:
+        """A context of its own, initialised with ROS arguments such as ``-r a:=b``."""
+        context = Context()
+        rclpy.init(context=context, domain_id=self.domain, args=["--ros-args", *args] if args else [])
+        self._contexts.append(context)
+        return context
+
+    def node(self, name: str, **options: Any) -> Node:
+        """A plain node of the test."""
+        return self.owns(Node(name, context=self.context(), **options))
+
+    def owns(self, node: NodeT) -> NodeT:
+        """Destroy ``node`` when the test ends, after the executors."""
+        self._nodes.append(node)
+        return node
+
+    def spin(self, *nodes: Node, kind: type[Executor] = SingleThreadedExecutor) -> None:
+        """Serve ``nodes`` from a thread until the test ends."""
+        executor = kind(context=nodes[0].context)
+        for node in nodes:
+            executor.add_node(node)
+
+        def work() -> None:
+            try:
+                executor.spin()
+            except ExternalShutdownException:
+                pass
+
+        thread = threading.Thread(target=work, name=f"spin-{nodes[0].get_name()}")
+        thread.start()
+        self._executors.append((executor, thread))
+
+    def start(self, *args: str, **options: Any) -> subprocess.Popen[str]:
+        """``python ARGS`` as a process in this domain; its output is text, both streams piped."""
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        process = subprocess.Popen([sys.executable, *args], env=self.environment, cwd=self.folder, **{**pipes, **options})
+        self._processes.append(process)
+        return process
+
+    def start_node(self, name: str, **parameters: object) -> subprocess.Popen[str]:
+        """One of fric's nodes as a process, with ROS parameters."""
+        pairs = [item for key, value in parameters.items() for item in ("-p", f"{key}:={value}")]
+        return self.start("-m", f"fric_nodes.nodes.{name}", "--ros-args", *pairs)
+
+    @staticmethod
+    def until(condition: Callable[[], object], what: str, limit: float = LIMIT) -> None:
+        """Wait until ``condition`` holds, and fail with ``what`` when it doesn't within ``limit`` [s]."""
+        deadline = time.monotonic() + limit
+        while not condition():
+            if time.monotonic() > deadline:
+                pytest.fail(f"not within {limit:g} s: {what}")
+            time.sleep(0.01)
+
+    @staticmethod
+    def finish(process: subprocess.Popen[str], number: int | None = None, limit: float = LIMIT) -> tuple[int, str, str]:
+        """Send signal ``number`` if given, wait for the end: exit status, standard output, standard error."""
+        if number is not None:
+            process.send_signal(number)
+        out, error = process.communicate(timeout=limit)
+        return process.returncode, out or "", error or ""
+
+    def close(self) -> None:
+        """End everything, in an order in which nothing is used after it is gone."""
+        for process in self._processes:
+            if process.poll() is None:
+                process.kill()
+            process.communicate()
+        for executor, thread in self._executors:
+            executor.shutdown(timeout_sec=5.0)
+            thread.join(timeout=10.0)
+            assert not thread.is_alive(), f"{thread.name} does not end"
+        for node in self._nodes:
+            node.destroy_node()
+        for context in self._contexts:
+            context.try_shutdown()
+        self._lock.close()
+
+
+def _free_domain() -> tuple[Any, int]:
+    """A domain id that is locked for as long as the returned file is open, so that parallel test runs don't meet."""
+    for domain in random.sample(_DOMAINS, len(_DOMAINS)):
+        file = (Path(tempfile.gettempdir()) / f"fric-test-domain-{domain}.lock").open("w")
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.close()
+            continue
+        return file, domain
+    raise RuntimeError("no free ROS domain")
+
+
+@pytest.fixture
+def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
+    """A graph of this test alone."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    graph = Graph(tmp_path)
+    yield graph
+    graph.close()
+
