@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import random
@@ -60,10 +61,8 @@ class Graph:
             executor.add_node(node)
 
         def work() -> None:
-            try:
+            with contextlib.suppress(ExternalShutdownException):
                 executor.spin()
-            except ExternalShutdownException:
-                pass
 
         thread = threading.Thread(target=work, name=f"spin-{nodes[0].get_name()}")
         thread.start()
@@ -135,4 +134,3 @@ def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
     graph = Graph(tmp_path)
     yield graph
     graph.close()
-

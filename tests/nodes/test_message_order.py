@@ -10,7 +10,12 @@ MS = 1_000_000
 
 def stamped(stamp_ns: int, content: int = 0) -> bytes:
     """A little-endian message: encapsulation, seconds, nanoseconds, empty frame_id, one number."""
-    return b"\x00\x01\x00\x00" + struct.pack("<iII", stamp_ns // 10**9, stamp_ns % 10**9, 1) + b"\0\0\0\0" + struct.pack("<q", content)
+    return (
+        b"\x00\x01\x00\x00"
+        + struct.pack("<iII", stamp_ns // 10**9, stamp_ns % 10**9, 1)
+        + b"\0\0\0\0"
+        + struct.pack("<q", content)
+    )
 
 
 def topic(name: str, *, clock: bool = True, header: bool = True) -> TopicIntake:
@@ -60,8 +65,19 @@ def test_lock_step_order_depends_on_nothing_but_stamps() -> None:
     assert [message[0] for message in first] == sorted(message[0] for message in first)
 
 
+def test_at_equal_stamps_the_order_of_discovery_does_not_matter() -> None:
+    written = []
+    for names in (("a", "b"), ("b", "a")):
+        topics = [topic(name) for name in names]
+        order = StampOrder(topics)
+        for at in range(2):
+            order.add(at, stamped(5), received=0)
+        written.append([topics[at].name for _, at, _ in order.release(None)])
+    assert written == [["a", "b"], ["a", "b"]]
+
+
 def test_a_message_waits_for_the_topics_that_lag_but_not_for_silent_ones() -> None:
-    order = StampOrder([topic("state"), topic("command"), topic("estimate")])
+    order = StampOrder([topic("a state"), topic("b command"), topic("c estimate")])
     order.add(2, stamped(0), received=0)
     order.add(0, stamped(0), received=1000 * MS)
     order.add(0, stamped(MS), received=1000 * MS)
@@ -111,7 +127,7 @@ def test_log_time_goes_on_when_the_stamps_start_again() -> None:
 
 def test_what_has_no_stamp_of_this_clock_takes_the_newest() -> None:
     wall = 1_700_000_000_000_000_000
-    order = StampOrder([topic("state"), topic("diagnostics", clock=False), topic("force", header=False)])
+    order = StampOrder([topic("a"), topic("diagnostics", clock=False), topic("force", header=False)])
     order.add(0, stamped(7 * MS), received=wall)
     order.add(1, stamped(wall), received=wall)
     order.add(2, b"\x00\x01\x00\x00........", received=wall)

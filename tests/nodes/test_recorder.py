@@ -13,7 +13,7 @@ from fric_nodes.bagio import bag_info, iterate_raw, read_record
 from fric_nodes.nodes.recorder import RecorderNode
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
@@ -66,7 +66,7 @@ def test_a_killed_recorder_leaves_a_readable_bag(graph: Any, tmp_path: Path, sto
     assert found == pytest.approx([k * 1e-3 for k in range(len(found))])
 
 
-@pytest.mark.parametrize(("storage", "compression"), [("mcap", "none"), ("mcap", "zstd"), ("sqlite3", "none"), ("sqlite3", "zstd")])
+@pytest.mark.parametrize(("storage", "compression"), [("mcap", "none"), ("sqlite3", "zstd")])
 def test_sigint_closes_the_bag(graph: Any, tmp_path: Path, storage: str, compression: str) -> None:
     bag = tmp_path / "bag"
     process = graph.start_node(
@@ -94,7 +94,7 @@ def test_nothing_is_lost_at_thousands_of_messages_a_second(graph: Any, tmp_path:
     for talker in talkers:
         assert graph.finish(talker, limit=60.0)[0] == 0
     assert graph.finish(process, signal.SIGINT)[0] == 0
-    counts = {topic.name: topic.count for topic in bag_info(bag).topics}
+    counts = {topic.name: topic.n_messages for topic in bag_info(bag).topics}
     assert {name: counts[f"/{name}"] for name in topics} == dict.fromkeys(topics, 3000)
     for name in topics:
         assert positions(bag, f"/{name}") == pytest.approx([k * 1e-3 for k in range(3000)])
@@ -107,9 +107,7 @@ def test_stamp_order_gives_the_same_bag_twice(graph: Any, tmp_path: Path) -> Non
     for run in range(2):
         bag = tmp_path / f"bag{run}"
         process = graph.start_node("recorder", bag=bag, log_time="stamp", topics="[joint_states,reference]")
-        talkers = [graph.start(TALKER, "0", "1500", topic) for topic in ("joint_states", "reference")]
-        for talker in talkers:
-            assert graph.finish(talker)[0] == 0
+        assert graph.finish(graph.start(TALKER, "0", "1500", "joint_states", "reference"))[0] == 0
         assert graph.finish(process, signal.SIGINT)[0] == 0
         contents.append([(raw.log_time_ns, raw.topic, raw.data) for raw in iterate_raw(bag)])
     assert len(contents[0]) == 3000
@@ -148,7 +146,7 @@ def test_latched_and_best_effort_topics_are_received(graph: Any, tmp_path: Path)
     assert [raw.data for raw in iterate_raw(bag, ["/friction/model"])] == [
         serialize_message(String(data="published before the recorder was there"))
     ]
-    assert next(iterate_raw(bag, ["/joint_states"])).data == serialize_message(sent)
+    assert deserialize_message(next(iterate_raw(bag, ["/joint_states"])).data, JointState) == sent
 
 
 def test_a_best_effort_publisher_that_joins_a_reliable_one_is_heard(graph: Any, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+import struct
 import sys
 from collections.abc import Collection, Iterator
 from contextlib import closing, suppress
@@ -69,6 +70,8 @@ class SqliteScan:
                 beside = path.with_name(path.name + suffix)
                 if beside.is_file():
                     shutil.copyfile(beside, copy.with_name(copy.name + suffix))
+            if not has_journal(path):
+                _fit_header(copy)
             self._connection = sqlite3.connect(copy)
             self._names = self._read_topics()
         except BaseException as error:
@@ -123,6 +126,24 @@ class SqliteScan:
             yield from self._connection.execute("SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY id")
         except sqlite3.DatabaseError as error:
             damage.append(f"read up to its last readable row ({error})")
+
+
+def _fit_header(copy: Path) -> None:
+    """Make the number of pages in the header of a copy that of the file, since SQLite opens no file that is shorter.
+
+    File format of SQLite, section 1.3: bytes 16 and 17 hold the page size (1 means 65536), bytes 28 to 31 the number of pages.
+    """
+    with copy.open("r+b") as file:
+        header = file.read(100)
+        if len(header) < 100 or not header.startswith(b"SQLite format 3\0"):
+            return
+        (page_size,), (pages,) = struct.unpack_from(">H", header, 16), struct.unpack_from(">I", header, 28)
+        page_size = 65536 if page_size == 1 else page_size
+        there = copy.stat().st_size // page_size if page_size else 0
+        if there < pages:
+            file.truncate(there * page_size)
+            file.seek(28)
+            file.write(struct.pack(">I", there))
 
 
 def sqlite_metadata(path: Path) -> dict[str, str]:

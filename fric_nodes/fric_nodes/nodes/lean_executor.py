@@ -13,12 +13,13 @@ from contextlib import ExitStack
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 __all__ = ["LeanExecutor"]
 
-_HOUSEKEEPING = 0.25  # [s] between looks at what is not in the wait set (event handlers, tasks)
+_EVENTS = 64  # at most so many events of the middleware in one look, so that a storm of them can't hold up the samples
+_HOUSEKEEPING = 0.5  # [s] between looks at what is not in the wait set (event handlers, tasks)
 _BATCH = 256  # messages taken from one subscription before the others get their turn
 
 
@@ -83,8 +84,13 @@ class LeanExecutor(SingleThreadedExecutor):
 
     def _look_around(self) -> None:
         """Let the parent class do what is left, and notice new entities."""
-        for _ in range(2 + len(self._services) + len(self._clients)):
-            super()._spin_once_impl(0.0)
+        for _ in range(2 * (len(self._services) + len(self._clients)) + _EVENTS):
+            try:
+                task, _entity, _node = self.wait_for_ready_callbacks(timeout_sec=0.0)
+            except TimeoutException:
+                break
+            task()
+            task.result()
         signature = self._signature()
         if signature != self._known:
             self._known = signature
@@ -101,6 +107,7 @@ class LeanExecutor(SingleThreadedExecutor):
         wait_set = self._wait_set
         ready = wait_set.get_ready_entities("subscription")
         timers = wait_set.get_ready_entities("timer")
+        # Guards wake the wait when an entity was made or destroyed, and for shutdown.
         others = any(wait_set.get_ready_entities(kind) for kind in ("guard_condition", "service", "client"))
         for timer in self._timers:
             handle = timer.handle

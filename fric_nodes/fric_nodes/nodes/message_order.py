@@ -117,15 +117,17 @@ class StampOrder:
     """Messages by their own time stamps, the same for every run of the same lock-step.
 
     Args:
-        topics: the topics, in the order in which they are written at equal stamps; may grow later.
+        topics: the topics; more may be appended later. At equal stamps they are written in the order of their names.
         on_restart: called with the topic's name when its stamps start again from an earlier time.
     """
 
     def __init__(self, topics: list[TopicIntake], on_restart: Callable[[str], None] = lambda name: None) -> None:
         self._topics = topics
         self._on_restart = on_restart
-        # (restart, stamp, topic, arrival, payload): restart counts how often the clock of the samples began anew.
-        self._waiting: list[tuple[int, int, int, int, bytes]] = []
+        # Restart counts how often the clock of the samples began anew. At equal stamps the name decides, not the index, since
+        # the order in which topics were discovered differs from run to run.
+        self._waiting: list[tuple[int, int, str, int, int, bytes]] = []
+        """Restart, stamp, name of the topic, arrival, index of the topic, payload."""
         self._arrival = 0
         self._newest = (0, 0)
         self._base = {0: 0}
@@ -150,7 +152,7 @@ class StampOrder:
         elif topic.stamped and topic.is_repetition(payload, -1):
             return
         self._arrival += 1
-        self._waiting.append((*key, index, self._arrival, payload))
+        self._waiting.append((*key, topic.name, self._arrival, index, payload))
 
     def release(self, before: int | None) -> list[Message]:
         """Messages up to the stamp that every talking topic has reached, in order; all of them when ``before`` is None.
@@ -161,7 +163,7 @@ class StampOrder:
         self._waiting.sort()
         cut = len(self._waiting) if before is None else self._settled(before)
         ready, self._waiting = self._waiting[:cut], self._waiting[cut:]
-        return [(self._log_time(restart, stamp), index, payload) for restart, stamp, index, _, payload in ready]
+        return [(self._log_time(restart, stamp), index, payload) for restart, stamp, _, _, index, payload in ready]
 
     def _settled(self, now: int) -> int:
         talking = [t for t in self._topics if t.follows_clock and t.last_stamp >= 0 and now - t.last_received < _SILENT_AFTER]

@@ -128,10 +128,9 @@ class Settings:
             value = node.declare_parameter(declaration.name, declaration.default, declaration.descriptor()).value
         except InvalidParameterTypeException:
             raise NodeParameterError(where, "has the wrong type", f"give a {wanted}: {declaration.doc}") from None
-        except InvalidParameterValueException as error:
-            refusal = declaration.refusal(error.args[1]) if len(error.args) > 1 else None
-            limits = f"give a value in [{declaration.lower:g}, {declaration.upper:g}]: {declaration.doc}"
-            raise NodeParameterError(where, refusal or "is out of range", limits) from None
+        except InvalidParameterValueException:
+            limits = f"give a value in [{declaration.lower:g}, {declaration.upper:g}] {declaration.unit}".rstrip()
+            raise NodeParameterError(where, "is out of range", f"{limits}: {declaration.doc}") from None
         refusal = declaration.refusal(value)
         if refusal is not None:
             raise NodeParameterError(where, refusal, declaration.doc)

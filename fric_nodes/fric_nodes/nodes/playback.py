@@ -1,8 +1,8 @@
 """When each message of a recording is to be published; no ROS in here.
 
-Deadlines are absolute: message k is due at ``begin + (t_k - t_0) / rate`` on the monotonic clock, so a late message delays none of
-those after it, and errors of sleeping don't add up. The time t of a message is the time of its reception or its own time
-stamp; a message without a stamp, or one whose time goes back, is due together with the message before it.
+Deadlines are absolute: message k is due at ``begin + (t_k - t_0) / rate`` on the monotonic clock, so a late message delays
+none of those after it, and errors of sleeping don't add up. The time t of a message is the time of its reception or its own
+time stamp; a message without a stamp, or one whose time goes back, is due together with the message before it.
 """
 
 from __future__ import annotations

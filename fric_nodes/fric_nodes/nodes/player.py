@@ -24,16 +24,30 @@ from ..bagio.errors import BagError
 from ..bagio.read import bag_info, iterate_raw
 from ..errors import InputError
 from .bulk import message_class
+from .parameters import NodeParameter, NodeParameterError, Settings
 from .playback import Due, Pace, recorded_qos, schedule
 
-__all__ = ["NoSubscribersError", "PlayerNode", "main"]
+__all__ = ["PARAMETERS", "NoSubscribersError", "PlayerNode", "main"]
 
+_BURST = 16  # messages published at once when there is no pace to keep; small against the queues of subscribers
+PARAMETERS = (
+    NodeParameter("bag", "", "bag to play: a rosbag2 folder, or a .mcap or .db3 file"),
+    NodeParameter("rate", 1.0, "speed relative to the recording; 0: without a pace, limited by pause", lower=0.0, upper=1000.0),
+    NodeParameter("start", 0.0, "leave out what comes before this time of the recording", unit="s", lower=0.0),
+    NodeParameter("end", 0.0, "leave out what comes after this time of the recording; 0: nothing", unit="s", lower=0.0),
+    NodeParameter("loop", False, "begin again at the end, until stopped", settable=True),
+    NodeParameter("topics", [""], "topics to play; empty: all"),
+    NodeParameter("clock", False, "publish the time of the recording on /clock"),
+    NodeParameter("time_source", "log", "pace by time of reception, or by the messages' own stamps", choices=("log", "stamp")),
+    NodeParameter("wait_for_subscribers", 0, "subscriptions, over all topics, to wait for before playing", lower=0, upper=1000),
+    NodeParameter("wait_timeout", 10.0, "longest time to wait for them", unit="s", lower=0.0),
+    NodeParameter("pause", 0.002, f"rest after every {_BURST} messages when rate is 0", unit="s", lower=0.0, upper=1.0),
+)
 _FRICTION_MODEL = "fric_interfaces/msg/FrictionModel"
 _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _DEPTH = 1000  # messages kept for a slow reliable subscriber
 _CLOCK_TICK = 0.01  # [s] of the recording between two messages on /clock
 _SETTLE_LIMIT = 4.0  # [s]; Fast DDS asks for acknowledgements every 3 s when nothing else is published
-_BURST = 16  # messages published at once when there is no pace to keep; small against the queues of subscribers
 
 
 class NoSubscribersError(InputError):
@@ -49,26 +63,19 @@ class PlayerNode(Node):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__("player", **node_options)
-        declare = self.declare_parameter
-        self._bag = Path(declare("bag", "").value)
-        self._rate: float = declare("rate", 1.0).value
-        self._start: float = declare("start", 0.0).value
-        self._end: float = declare("end", 0.0).value
-        self._loop: bool = declare("loop", False).value
-        topics = [name for name in declare("topics", [""]).value if name]
-        self._by_stamp = declare("time_source", "log").value == "stamp"
-        self._subscribers: int = declare("wait_for_subscribers", 0).value
-        self._patience: float = declare("wait_timeout", 10.0).value
-        self._pause: float = declare("pause", 0.002).value
+        settings = self._settings = Settings(self, PARAMETERS)
+        if not settings.text("bag"):
+            raise NodeParameterError("parameter 'bag' of the player", "is missing", "name the bag to play")
+        self._bag = Path(settings.text("bag"))
         self.stop = threading.Event()
         """Set it to end the playing early."""
         self.published = 0
         """Messages published so far."""
-        self._clock = self.create_publisher(Clock, "/clock", 10) if declare("clock", False).value else None
+        self._time = self.create_publisher(Clock, "/clock", 10) if settings.flag("clock") else None
         self._stamped: set[str] = set()
         self._publishers_of: dict[str, Publisher] = {}
         self._total = 0
-        self._open(topics)
+        self._open(settings.texts("topics"))
 
     def _open(self, topics: list[str]) -> None:
         """Make a publisher for every topic to be played whose type is installed."""
@@ -87,7 +94,7 @@ class PlayerNode(Node):
             if next(iter(kind.get_fields_and_field_types().values()), "") == "std_msgs/Header":
                 self._stamped.add(topic.msgtype)
             self._publishers_of[name] = self.create_publisher(kind, name, _playing_qos(offered.get(name), topic.msgtype))
-            self._total += topic.count
+            self._total += topic.n_messages
 
     def play(self) -> bool:
         """Publish the recording, as often as was asked for; True when it was published to its end.
@@ -96,15 +103,18 @@ class PlayerNode(Node):
             BagError: the bag turns out to be damaged on the way.
             NoSubscribersError: nobody subscribed in time.
         """
-        self._wait_for_subscribers()
+        settings = self._settings
+        self._wait_for_subscribers(settings.integer("wait_for_subscribers"), settings.number("wait_timeout"))
+        rate, end = settings.number("rate"), settings.number("end")
+        by_stamp = settings.text("time_source") == "stamp"
         while True:
-            pace = Pace(self._rate, self.stop) if self._rate > 0 else None
+            pace = Pace(rate, self.stop) if rate > 0 else None
             messages = schedule(
                 iterate_raw(self._bag, list(self._publishers_of)),
-                stamped=self._stamped - {_DIAGNOSTICS} if self._by_stamp else (),
-                start=self._start,
-                end=self._end if self._end > 0 else None,
-                tick=_CLOCK_TICK if self._clock else None,
+                stamped=self._stamped - {_DIAGNOSTICS} if by_stamp else (),
+                start=settings.number("start"),
+                end=end if end > 0 else None,
+                tick=_CLOCK_TICK if self._time else None,
             )
             for due in messages:
                 if not (pace.wait(due.time_ns) if pace else self._throttle()):
@@ -113,7 +123,7 @@ class PlayerNode(Node):
             self._settle()
             late = f", at most {pace.worst_delay * 1e3:.1f} ms late" if pace else ""
             self.get_logger().info(f"played {self.published} messages{late}")
-            if not self._loop:
+            if not settings.flag("loop"):
                 return True
             self.published = 0
 
@@ -122,9 +132,9 @@ class PlayerNode(Node):
             self._publishers_of[due.message.topic].publish(due.message.data)
             self.published += 1
             self._progress()
-        elif self._clock is not None:
+        elif self._time is not None:
             seconds, nanoseconds = divmod(due.time_ns, 1_000_000_000)
-            self._clock.publish(Clock(clock=Time(sec=seconds, nanosec=nanoseconds)))
+            self._time.publish(Clock(clock=Time(sec=seconds, nanosec=nanoseconds)))
 
     def _progress(self) -> None:
         if self._total and self.published * 10 // self._total != (self.published - 1) * 10 // self._total:
@@ -137,7 +147,7 @@ class PlayerNode(Node):
         not that it was taken out, and the middleware may ask for them as seldom as every 3 s.
         """
         if self.published % _BURST == 0 and self.published:
-            return not self.stop.wait(self._pause)
+            return not self.stop.wait(self._settings.number("pause"))
         return not self.stop.is_set()
 
     def _settle(self) -> None:
@@ -146,16 +156,16 @@ class PlayerNode(Node):
         for publisher in self._publishers_of.values():
             publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
-    def _wait_for_subscribers(self) -> None:
+    def _wait_for_subscribers(self, wanted: int, patience: float) -> None:
         def count() -> int:
             return sum(publisher.get_subscription_count() for publisher in self._publishers_of.values())
 
-        deadline = time.monotonic() + self._patience
-        while count() < self._subscribers and not self.stop.wait(0.02):
+        deadline = time.monotonic() + patience
+        while count() < wanted and not self.stop.wait(0.02):
             if time.monotonic() > deadline:
                 raise NoSubscribersError(
                     self._bag,
-                    f"{count()} of {self._subscribers} subscriptions within {self._patience:g} s",
+                    f"{count()} of {wanted} subscriptions within {patience:g} s",
                     "start the subscribers first, or raise wait_timeout",
                 )
 

@@ -21,12 +21,16 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..bagio.errors import WriteError
+from ..bagio.padding import PaddingEraser
+from ..bagio.types import type_fields
 from ..bagio.write import BagWriter
 from ..errors import InputError
 from .bulk import BulkSubscription, message_class, offered_qos
 from .message_order import ReceiveOrder, StampOrder, TopicIntake
+from .parameters import NodeParameter, NodeParameterError, Settings
+from .qos import DIAGNOSTICS
 
-__all__ = ["DEFAULT_TOPICS", "RecorderNode", "main"]
+__all__ = ["DEFAULT_TOPICS", "PARAMETERS", "RecorderNode", "main"]
 
 DEFAULT_TOPICS = (
     "joint_states",
@@ -35,7 +39,21 @@ DEFAULT_TOPICS = (
     "feedforward_force",
     "friction/model",
     "friction/estimate",
-    "diagnostics",
+    "/diagnostics",  # one for the whole graph, whatever the namespace
+)
+PARAMETERS = (
+    NodeParameter("bag", "", "folder of the bag to write; must not exist"),
+    NodeParameter("storage", "mcap", "storage format of the bag", choices=("mcap", "sqlite3")),
+    NodeParameter("compression", "none", "compression of chunks (mcap) or messages (sqlite3)", choices=("none", "zstd")),
+    NodeParameter("topics", list(DEFAULT_TOPICS), "names of the topics, relative ones in the node's namespace"),
+    NodeParameter("all_topics", False, "record every topic that is not hidden"),
+    NodeParameter("log_time", "receive", "log times: of reception, or the messages' stamps", choices=("receive", "stamp")),
+    NodeParameter("joint", "axis", "name of the joint, for those who read the bag"),
+    NodeParameter("position_unit", "m", "unit of positions, for those who read the bag"),
+    NodeParameter("force_unit", "N", "unit of efforts, for those who read the bag"),
+    NodeParameter("effort_hold", "preceding", "when an effort acts", choices=("following", "preceding", "linear")),
+    NodeParameter("queue_depth", 5000, "messages that may wait on each topic between two rounds", lower=1, upper=1_000_000),
+    NodeParameter("drain_period", 0.02, "time between two rounds of taking messages", unit="s", lower=0.001, upper=1.0),
 )
 _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _BATCH = 20_000  # messages taken from one topic in one round, so that a flood on one cannot starve the others
@@ -50,32 +68,28 @@ class RecorderNode(Node):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__("recorder", **node_options)
-        declare = self.declare_parameter
-        bag = Path(declare("bag", "").value)
-        storage = declare("storage", "mcap").value
-        compression = declare("compression", "none").value
-        names = declare("topics", list(DEFAULT_TOPICS)).value or DEFAULT_TOPICS
-        self._all_topics = declare("all_topics", False).value
-        self._by_stamp = declare("log_time", "receive").value == "stamp"
-        self._depth = declare("queue_depth", 5000).value
-        drain_period = declare("drain_period", 0.02).value
-        metadata = {
-            "fric.joint": declare("joint", "axis").value,
-            "fric.position_unit": declare("position_unit", "m").value,
-            "fric.force_unit": declare("force_unit", "N").value,
-            "fric.effort_hold": declare("effort_hold", "preceding").value,
-            "fric.log_time": "stamp" if self._by_stamp else "receive",
-        }
-        self._wanted = {self.resolve_topic_name(name) for name in names}
+        settings = Settings(self, PARAMETERS)
+        if not settings.text("bag"):
+            raise NodeParameterError("parameter 'bag' of the recorder", "is missing", "name the folder to record into")
+        bag = Path(settings.text("bag"))
+        self._all_topics = settings.flag("all_topics")
+        self._by_stamp = settings.text("log_time") == "stamp"
+        self._depth = settings.integer("queue_depth")
+        self._wanted = {self.resolve_topic_name(name) for name in settings.texts("topics") or DEFAULT_TOPICS}
+        storage: Any = settings.text("storage")
+        compression: Any = settings.text("compression")
+        stored = ("joint", "position_unit", "force_unit", "effort_hold", "log_time")
+        metadata = {f"fric.{name}": settings.text(name) for name in stored}
         self._writer = BagWriter(bag, storage=storage, compression=compression, metadata=metadata)
         self._topics: list[TopicIntake] = []
         self._order = StampOrder(self._topics, self._warn_restart) if self._by_stamp else ReceiveOrder(self._topics)
         self._bulk: list[BulkSubscription] = []
+        self._erasers: list[PaddingEraser] = []
         self._refused: set[str] = set()
         self._written_before = 0
-        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", DIAGNOSTICS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # the node's own clock may be simulated, and stand still
-        for period, work in ((drain_period, self.drain), (0.05, self.discover), (1.0, self.report)):
+        for period, work in ((settings.number("drain_period"), self.drain), (0.05, self.discover), (1.0, self.report)):
             self.create_timer(period, work, clock=steady)
         self.get_logger().info(f"recording into {bag}")
 
@@ -113,6 +127,7 @@ class RecorderNode(Node):
             self._refused.add(topic)
             self.get_logger().warning(f"{topic}: not recorded, its type {msgtype} is not installed ({error})")
             return
+        self._erasers.append(PaddingEraser(msgtype, type_fields(msgtype)))
         stamped = first == "std_msgs/Header"
         self._topics.append(TopicIntake(topic, stamped, follows_clock=stamped and msgtype != _DIAGNOSTICS))
         self.get_logger().info(f"recording {topic} [{msgtype}]")
@@ -121,11 +136,14 @@ class RecorderNode(Node):
         """Move what topic number ``at`` has received from the middleware's queue into the order."""
         subscription, intake, add = self._bulk[at], self._topics[at], self._order.add
         one_publisher = subscription.publishers() <= 1
+        erase = self._erasers[at]
         for payload, received, sequence in subscription.take(_BATCH):
             intake.count(sequence, one_publisher)
-            add(at, payload, received)
+            # Without this, neither would retransmissions be recognised nor two runs of one lock-step give the same bag.
+            add(at, erase(payload), received)
 
     def drain(self) -> None:
+        """Take what the middleware has received on all topics, and write what is complete."""
         before = time.time_ns()  # the clock on which the middleware stamps reception
         for at in range(len(self._topics)):
             self._take(at)
@@ -147,6 +165,7 @@ class RecorderNode(Node):
         self.get_logger().warning(f"{topic}: stamps start again from an earlier time; the bag goes on, in a part of its own")
 
     def report(self) -> None:
+        """Publish counts, rate and losses on /diagnostics."""
         lost = sum(topic.lost for topic in self._topics)
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if lost else DiagnosticStatus.OK,
@@ -179,7 +198,7 @@ class RecorderNode(Node):
 
 def _receives_as_well(present: QoSProfile, offered: QoSProfile) -> bool:
     """True when a subscription with ``present`` receives from publishers with which ``offered`` is the best that can be had."""
-    return present.reliability >= offered.reliability and present.durability >= offered.durability
+    return bool(present.reliability >= offered.reliability and present.durability >= offered.durability)
 
 
 def main(args: list[str] | None = None) -> None:

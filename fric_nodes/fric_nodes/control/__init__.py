@@ -1,0 +1,1 @@
+"""Controllers and their tuning, without ROS: numbers in, numbers out, seconds throughout."""

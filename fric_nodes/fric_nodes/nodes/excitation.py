@@ -1,0 +1,137 @@
+"""The motion that is wanted of the axis: gives ``reference``, or ``force_command`` for an open-loop excitation."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from fric_interfaces.msg import Reference, StampedForce
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from ..excitation import EXCITATIONS
+from ..excitation.sequence import Sequence
+from ..record import Units
+from .base import LOCK_STEP, PERIOD, LoopNode, wall_clock
+from .convert import from_seconds, nanoseconds, set_stamp
+from .main import run
+from .parameters import NodeParameter, from_declaration
+from .qos import SAMPLES
+
+__all__ = ["ExcitationNode", "main"]
+
+_BLOCK = 512  # samples planned together; always the same ones, so that every sample has the same bits in every run
+PARAMETERS = (
+    PERIOD,
+    LOCK_STEP,
+    NodeParameter("kinds", ["multisine"], "excitations to go through, in this order", choices=tuple(EXCITATIONS)),
+    NodeParameter("seed", 0, "of what is random in them", "", 0, 2**31 - 1),
+    NodeParameter("start_delay", 0.5, "rest before the first", "s", 0.0, 1e6),
+    NodeParameter("pause", 0.5, "rest after each", "s", 0.0, 1e6),
+    NodeParameter("repeat", False, "go through them again and again"),
+    NodeParameter("output", "reference", "what is published; force: position is the force [N or N m]", choices=("reference", "force")),
+    NodeParameter("stamped", False, "wall time, output force: publish StampedForce instead of Float64; lock-step always does"),
+    NodeParameter("look_ahead", 16, "lock-step: samples sent ahead of the plant; makes no difference to the numbers", "", 0, 64),
+    *(from_declaration(p, kind.id, Units()) for kind in EXCITATIONS.values() for p in kind.parameters),
+)
+
+
+class ExcitationNode(LoopNode):
+    """A planned motion, published sample by sample; options as for ``rclpy.node.Node``.
+
+    Raises:
+        InputError: a parameter can't be used.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("excitation", PARAMETERS, **options)
+        settings = self.settings
+        random = np.random.default_rng(settings.integer("seed"))
+        parts = []
+        for name in settings.texts("kinds"):
+            kind = EXCITATIONS[name]
+            parts.append(kind.plan({p.name: settings.number(f"{name}.{p.name}") for p in kind.parameters}, random))
+        self._plan = Sequence(parts, settings.number("start_delay"), settings.number("pause"), settings.flag("repeat"))
+        self._forces = settings.text("output") == "force"
+        stamped = self.lock_step or not self._forces or settings.flag("stamped")
+        kind_of_message = (StampedForce if stamped else Float64) if self._forces else Reference
+        self._message = kind_of_message()
+        if stamped:
+            self._message.header.frame_id = self.joint
+        self._publisher = self.create_publisher(kind_of_message, "force_command" if self._forces else "reference", SAMPLES)
+        self.get_logger().info(f"{', '.join(settings.texts('kinds'))}: {self._plan.duration:.1f} s")
+        if self.lock_step:
+            self._period_ns = from_seconds(self.period)
+            self._ahead = settings.integer("look_ahead")
+            self._next = 0
+            self._seen = -1
+            self._block: tuple[int, list[list[float]]] = (-1, [])
+            self.create_subscription(JointState, "joint_states", self._on_state, SAMPLES)
+        else:
+            self._epoch, self._origin = wall_clock()
+            self._start: int | None = None
+            self.create_timer(self.period, self._tick)
+
+    def condition(self) -> Mapping[str, str]:
+        return {"planned duration [s]": f"{self._plan.duration:.3f}"}
+
+    def _publish(self, stamp: int, position: float, velocity: float, acceleration: float) -> None:
+        message = self._message
+        if isinstance(message, Float64):
+            message.data = position
+        else:
+            set_stamp(message.header.stamp, stamp)
+            if isinstance(message, StampedForce):
+                message.force = position
+            else:
+                message.position, message.velocity, message.acceleration = position, velocity, acceleration
+        self._publisher.publish(message)
+
+    # Lock-step
+
+    def _on_state(self, state: JointState) -> None:
+        sample = nanoseconds(state.header.stamp) // self._period_ns
+        if sample <= self._seen:
+            # The plant repeats itself, or has started again: someone has missed what was sent from here on.
+            self.counters["repeated states"] += 1
+            self._next = sample
+        elif self._next < sample:
+            self._next = sample
+        self._seen = sample
+        # Sent in bursts, which wakes the receivers less often.
+        if self._next <= sample + self._ahead // 2:
+            while self._next <= sample + self._ahead:
+                self._publish(self._next * self._period_ns, *self._at(self._next))
+                self._next += 1
+            self.deadlines.tick(time.monotonic())
+
+    def _at(self, sample: int) -> list[float]:
+        number, at = divmod(sample, _BLOCK)
+        if self._block[0] != number:
+            times = np.arange(number * _BLOCK, (number + 1) * _BLOCK) * self.period
+            self._block = (number, np.stack(self._plan.at(times), axis=1).tolist())
+        return self._block[1][at]
+
+    # Wall time
+
+    def _tick(self) -> None:
+        now = time.monotonic_ns()
+        if self._start is None:
+            # The motion starts when somebody is there to follow it.
+            if self._publisher.get_subscription_count() == 0:
+                return
+            self._start = now
+        position, velocity, acceleration = self._plan.at(np.array([(now - self._start) * 1e-9]))
+        self._publish(self._epoch + now - self._origin, float(position[0]), float(velocity[0]), float(acceleration[0]))
+        self.deadlines.tick(now * 1e-9)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run(ExcitationNode, args)
+
+
+if __name__ == "__main__":
+    main()

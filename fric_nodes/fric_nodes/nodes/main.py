@@ -1,0 +1,45 @@
+"""The main function that all loop nodes share."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+
+from ..errors import InputError
+from .base import LoopNode
+from .lean_executor import LeanExecutor
+
+__all__ = ["run"]
+
+
+def run(make: Callable[[], LoopNode], args: list[str] | None = None) -> None:
+    """Run the node that ``make`` makes until it has finished or a signal ends it.
+
+    SIGINT, SIGTERM and the end of its work are exit status 0; an input that can't be used is one line and status 2.
+    """
+    refusal: InputError | None = None
+    rclpy.init(args=args)
+    try:
+        executor = LeanExecutor()
+        node = None
+        try:
+            node = make()
+            executor.add_node(node)
+            executor.spin_until_future_complete(node.finished)
+        finally:
+            executor.shutdown()
+            if node is not None:
+                node.close()
+                node.destroy_node()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except InputError as error:
+        refusal = error
+    finally:
+        rclpy.try_shutdown()
+    if refusal is not None:
+        print(refusal, file=sys.stderr)
+        sys.exit(2)

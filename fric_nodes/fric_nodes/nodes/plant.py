@@ -1,0 +1,181 @@
+"""The machine to be controlled, simulated: takes ``force_command``, gives ``joint_states``.
+
+In wall time the axis moves by the time that really passes, and a command acts from the moment of its arrival; without a command
+for ``watchdog_time`` the drive gives no force. In lock-step it moves by one period when the command for the present sample has come.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from fric_interfaces.msg import StampedForce
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from ..axis import SimulatedAxis
+from ..model_file import read_model
+from .base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent, wall_clock
+from .convert import from_seconds, nanoseconds, set_stamp
+from .lockstep import Stream
+from .main import run
+from .parameters import NodeParameter
+from .qos import SAMPLES
+from .share import share_file
+
+__all__ = ["PlantNode", "main"]
+
+PARAMETERS = (
+    PERIOD,
+    LOCK_STEP,
+    NodeParameter("model_file", "", "fric-model/1 file of the axis; empty: the demo axis that comes with the package"),
+    NodeParameter("resolution", 1e-7, "step of the encoder; 0: ideal", "m or rad", 0.0, 1.0),
+    NodeParameter("publish_velocity", True, "publish the difference quotient of positions as velocity; false: leave it empty"),
+    NodeParameter("force_noise", 0.0, "standard deviation of the effort signal", "N or N m", 0.0, 1e9),
+    NodeParameter("force_limit", 1e6, "largest force of the drive", "N or N m", 0.0, 1e12),
+    NodeParameter("seed", 0, "of the noise", "", 0, 2**31 - 1),
+    NodeParameter("watchdog_time", 0.1, "wall time: without a command for so long the force is zero", "s", 1e-3, 1e6),
+    NodeParameter("retry_time", 0.2, "lock-step: repeat the state when no command has come for so long", "s", 1e-2, 1e3),
+    NodeParameter("duration", 0.0, "end after so much time of the axis; 0: endless", "s", 0.0, 1e9),
+    NodeParameter("stamped", False, "wall time: take StampedForce instead of Float64; lock-step always does"),
+)
+
+
+class PlantNode(LoopNode):
+    """One simulated axis; options as for ``rclpy.node.Node``.
+
+    Raises:
+        InputError: a parameter or the model file can't be used.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("plant", PARAMETERS, **options)
+        settings = self.settings
+        self._axis = SimulatedAxis(
+            read_model(settings.text("model_file") or share_file("config/demo_axis.yaml")),
+            resolution=settings.number("resolution"),
+            force_noise=settings.number("force_noise"),
+            force_limit=settings.number("force_limit"),
+            seed=settings.integer("seed"),
+        )
+        # Compiled (or fetched from the cache) here and not at the first sample.
+        self._axis.advance(0.0, 1e-12)
+        self._axis.measure()
+        self._publish_velocity = settings.flag("publish_velocity")
+        duration = settings.number("duration")
+        self._last_sample = round(duration / self.period) if duration > 0.0 else math.inf
+        self._sample = 0
+        self._state = JointState(name=[self.joint], position=[0.0])
+        self._state.header.frame_id = self.joint
+        self._publisher = self.create_publisher(JointState, "joint_states", SAMPLES)
+        stamped = self.lock_step or settings.flag("stamped")
+        self.create_subscription(
+            StampedForce if stamped else Float64, "force_command", self._on_step if self.lock_step else self._on_force, SAMPLES
+        )
+        if self.lock_step:
+            self._period_ns = from_seconds(self.period)
+            self._commands: Stream[float] = Stream()
+            self._started = self._repeated_at = -1.0
+            self._answered = -1
+            self._measure(0)
+            self.create_timer(settings.number("retry_time"), self._retry)
+        else:
+            self._epoch, self._origin = wall_clock()
+            self._now = self._commanded = self._origin
+            self._force = 0.0
+            self._watchdog = from_seconds(settings.number("watchdog_time"))
+            self._fed = False
+            self.create_timer(self.period, self._tick)
+
+    def condition(self) -> Mapping[str, str]:
+        return {"samples": str(self._sample), "saturated": str(self._axis.saturated)}
+
+    def _measure(self, stamp: int) -> None:
+        """Fill in the state at ``stamp`` [ns]."""
+        state, measured = self._state, self._axis.measure()
+        set_stamp(state.header.stamp, stamp)
+        state.position = [measured.position]
+        state.velocity = [measured.velocity] if self._publish_velocity else []
+        state.effort = [measured.effort]
+
+    def _end_if_due(self) -> bool:
+        if self._sample < self._last_sample:
+            return False
+        if not self.finished.done():
+            wait_until_sent(self._publisher, 1.0)
+            self.finish()
+        return True
+
+    # Lock-step
+
+    def _on_step(self, command: StampedForce) -> None:
+        if not math.isfinite(command.force):
+            self.refuse("command", f"force is {command.force}")
+            return
+        self._commands.put(nanoseconds(command.header.stamp), command.force)
+        while (force := self._commands.get(self._sample * self._period_ns)) is not None:
+            if self._sample >= self._last_sample:
+                return
+            if self._sample == 0:
+                self._started = time.monotonic()
+            self._axis.advance(force, self.period)
+            self._sample += 1
+            self._measure(self._sample * self._period_ns)
+            self._publisher.publish(self._state)
+            self.deadlines.tick(time.monotonic())
+            self._commands.forget_before(self._sample * self._period_ns)
+        if self._sample >= self._last_sample and not self.finished.done():
+            rate = self._sample / (time.monotonic() - self._started)
+            self.get_logger().info(f"{self._sample} samples, {rate:.0f} samples/s")
+            self._end_if_due()
+
+    def _retry(self) -> None:
+        if self._sample == self._answered:
+            self.counters["repeated states"] += 1
+            self._publisher.publish(self._state)
+        self._answered = self._sample
+
+    # Wall time
+
+    def _advance_to(self, now: int) -> None:
+        """Move the axis to ``now`` [ns, monotonic] under the force that the drive has been giving."""
+        end_of_force = self._commanded + self._watchdog
+        if self._fed and now > end_of_force:
+            self._axis.advance(self._force, (end_of_force - self._now) * 1e-9)
+            self._now = max(self._now, end_of_force)
+            self._force = 0.0
+            self._fed = False
+            self.counters["watchdog"] += 1
+            self.get_logger().warning("no command within the watchdog time, force is zero", throttle_duration_sec=1.0)
+        self._axis.advance(self._force, (now - self._now) * 1e-9)
+        self._now = now
+
+    def _on_force(self, command: Float64 | StampedForce) -> None:
+        force = command.data if isinstance(command, Float64) else command.force
+        if not math.isfinite(force):
+            self.refuse("command", f"force is {force}")
+            return
+        now = time.monotonic_ns()
+        self._advance_to(now)
+        self._commanded, self._force, self._fed = now, force, True
+
+    def _tick(self) -> None:
+        if self._end_if_due():
+            return
+        now = time.monotonic_ns()
+        self._advance_to(now)
+        self._sample += 1
+        self._measure(self._epoch + now - self._origin)
+        self._publisher.publish(self._state)
+        self.deadlines.tick(now * 1e-9)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run(PlantNode, args)
+
+
+if __name__ == "__main__":
+    main()
