@@ -74,7 +74,7 @@ class SimulatedAxis:
         n_substeps = self._substeps.get(duration)
         if n_substeps is None:
             n_substeps = substeps(self._model, duration)
-            if len(self._substeps) < 64:  # noqa: PLR2004 - in wall time hardly any duration comes twice
+            if len(self._substeps) < 64:
                 self._substeps[duration] = n_substeps
         self._simulator.run(np.array([limited]), duration, n_substeps)
         self._impulse += limited * duration

@@ -1,10 +1,11 @@
 """From a model's structure to compiled loops, fused for its terms and cached on disk.
 
 The structure of a model (which plant, which effects, in which order) is written out as a small Python module that calls the
-effects' own compiled functions and holds the text of the plant's step and of the loops; numba compiles that module as a whole: the
-terms are inlined into one step, parameters stay data. (Passing the functions as arguments instead would be shorter, but numba
-does not cache a function that takes functions.) The module is stored under a name that holds a hash of everything it is made from, so that a second start finds the machine
-code on disk and a changed equation is never served from an old cache.
+effects' own compiled functions and holds the text of the plant's step and of the loops; numba compiles that module as a
+whole: the terms are inlined into one step, parameters stay data. (Passing the functions as arguments instead would be
+shorter, but numba does not cache a function that takes functions.) The module is stored under a name that holds a hash of
+everything it is made from, so that a second start finds the machine code on disk and a changed equation is never served
+from an old cache.
 
 The cache lives in ``$FRIC_CACHE_DIR``, or ``fric`` in the user's cache folder, or, where neither can be written, in a
 temporary folder for this process.
@@ -157,9 +158,10 @@ def _import(source: str, fingerprint: str) -> ModuleType:
         # Written aside and renamed, so that another process never sees half a file.
         with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False, encoding="utf-8") as file:
             file.write(source)
-        os.replace(file.name, path)
+        Path(file.name).replace(path)
     specification = importlib.util.spec_from_file_location(name, path)
-    assert specification is not None and specification.loader is not None
+    assert specification is not None
+    assert specification.loader is not None
     module = importlib.util.module_from_spec(specification)
     sys.modules[name] = module
     specification.loader.exec_module(module)

@@ -110,6 +110,4 @@ class Effect:
 
     def values(self, given: Mapping[str, Any]) -> Sequence[float]:
         """The parameters' values in order, defaults filled in; KeyError when one without default is missing."""
-        return [
-            float(given[p.name]) if p.name in given or p.default is None else p.default for p in self.parameters
-        ]
+        return [float(given[p.name]) if p.name in given or p.default is None else p.default for p in self.parameters]

@@ -1,6 +1,7 @@
 """The two compiled loops of every model: motion from force, and force from motion.
 
-They are written once, over the names of :mod:`fric_nodes.assembled`, and compiled for each structure by :mod:`fric_nodes.compile`.
+They are written once, over the names of :mod:`fric_nodes.assembled`, and compiled for each structure by
+:mod:`fric_nodes.compile`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .assembled import RIGID, drive, force, level, level_sum, slip, step
+from .assembled import RIGID, drive, force, level_sum, slip, step
 from .effect import Context
 
 __all__ = ["predict", "simulate"]
@@ -20,8 +21,9 @@ def simulate(
 ) -> None:  # fmt: skip
     """Lead the states ``x`` and ``z``, in place, over ``len(u)`` intervals of length ``h`` [s] in ``n_sub`` steps each.
 
-    ``u[k]`` acts over the whole interval k. ``x_out[k]`` is the mechanical state at the end of interval k and ``friction_out[k]`` the
-    contact's mean friction force [F] over it. ``load`` and ``temperature`` hold one value, or one for each interval.
+    ``u[k]`` acts over the whole interval k. ``x_out[k]`` is the mechanical state at the end of interval k and
+    ``friction_out[k]`` the contact's mean friction force [F] over it. ``load`` and ``temperature`` hold one value, or one
+    for each interval.
     """
     h_sub = h / n_sub
     x_next = np.empty_like(x)

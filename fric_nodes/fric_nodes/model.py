@@ -1,8 +1,8 @@
 """Model: a plant and a list of terms, each one physical effect with its values.
 
 A model is immutable; a fit makes a new one with :meth:`Model.with_values`. Parameters are named ``mass`` (the plant's own) and
-``coulomb.force`` (a term's), with ``#2`` behind the effect where a model holds the same effect twice. The text form, ``fric-model/1``,
-is in :mod:`fric_nodes.model_file`; what a model does is in :mod:`fric_nodes.simulate`.
+``coulomb.force`` (a term's), with ``#2`` behind the effect where a model holds the same effect twice. The text form,
+``fric-model/1``, is in :mod:`fric_nodes.model_file`; what a model does is in :mod:`fric_nodes.simulate`.
 """
 
 from __future__ import annotations

@@ -7,7 +7,6 @@ failed write leaves the old file as it was.
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from io import StringIO
@@ -20,6 +19,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
 
 from .effects import EFFECTS, by_name
+from .files import write_text
 from .model import Model, ModelError, Term, build_model
 from .parameter import Parameter
 from .plants import PLANTS
@@ -164,7 +164,9 @@ def model_from_text(text: str, source: str = "model") -> Model:
     stray = sorted(set(model.standard_errors) - set(model.names))
     if stray:
         where = f"{source}, line {_line(tree, ('standard_errors', stray[0]))}"
-        raise ModelError(where, f"standard error of '{stray[0]}', which the model doesn't have", f"use {', '.join(model.names)}")
+        raise ModelError(
+            where, f"standard error of '{stray[0]}', which the model doesn't have", f"use {', '.join(model.names)}"
+        )
     return model
 
 
@@ -224,6 +226,7 @@ def model_to_text(model: Model) -> str:
     yaml = YAML(typ="rt")
     yaml.default_flow_style = False
     yaml.width = 120
+
     def entry(first: Mapping[str, str], parameters: Sequence[Parameter], values: Sequence[float]) -> CommentedMap:
         held = CommentedMap(first)
         for parameter, value in zip(parameters, values, strict=True):
@@ -258,14 +261,6 @@ def write_model(model: Model, path: str | os.PathLike[str]) -> None:
     """Write ``model`` to ``path``, all or nothing.
 
     Raises:
-        ModelError: the file can't be written.
+        InputError: the file can't be written.
     """
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=target.parent, suffix=".tmp", delete=False, encoding="utf-8") as file:
-            file.write(model_to_text(model))
-        os.chmod(file.name, 0o644)
-        os.replace(file.name, target)
-    except OSError as error:
-        raise ModelError(path, f"cannot be written ({error})", "choose a folder that you can write to") from None
+    write_text(path, model_to_text(model))

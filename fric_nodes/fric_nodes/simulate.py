@@ -1,7 +1,7 @@
 """What a model does: motion from force (simulation) and force from motion (prediction), in compiled loops.
 
-Fixed step, exact sticking, and as many sub-steps as the fastest rate of the model asks for. Long runs are one call; a node that goes
-sample by sample keeps a :class:`Simulator` or a :class:`Predictor`, whose state lives from call to call.
+Fixed step, exact sticking, and as many sub-steps as the fastest rate of the model asks for. Long runs are one call; a node
+that goes sample by sample keeps a :class:`Simulator` or a :class:`Predictor`, whose state lives from call to call.
 """
 
 from __future__ import annotations
@@ -184,9 +184,7 @@ class Predictor:
 
     def step(self, time: float, position: float, velocity: float, acceleration: float, duration: float) -> float:
         """Force needed at one sample that stands for ``duration`` [s] of motion [F]."""
-        effort, _ = self.run(
-            np.array([time]), np.array([position]), np.array([velocity]), np.array([acceleration]), duration
-        )
+        effort, _ = self.run(np.array([time]), np.array([position]), np.array([velocity]), np.array([acceleration]), duration)
         return float(effort[0])
 
 
@@ -200,6 +198,7 @@ def predict_force(
     load: Array = _NOMINAL_LOAD,
     temperature: Array = _NOMINAL_TEMPERATURE,
 ) -> Array:
-    """Force that ``model`` needs for a given motion [F], shape ``(n_samples,)``; at zero velocity without slip dynamics, none."""
+    """Force that ``model`` needs for a given motion [F], shape ``(n_samples,)``; at zero velocity without slip dynamics,
+    none."""
     effort, _ = Predictor(model).run(time, position, velocity, acceleration, sample_time, load, temperature)
     return effort

@@ -1,8 +1,7 @@
-"""Bags written with plain rosbags, independent of fric's own writer, and the switch for tests on real recordings."""
+"""Bags written with plain rosbags, independent of fric's own writer."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,28 +12,6 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 START_NS = 1_700_000_000_000_000_000
-_DATA_REASON = "tests on real recordings need the environment variable FRIC_DATA (the folder that holds emps/, tiago_torso/, ...)"
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "real_data: reads real recordings from the folder FRIC_DATA")
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    left_out = [item for item in items if item.get_closest_marker("real_data")]
-    if left_out and not os.environ.get("FRIC_DATA"):
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if item not in left_out]
-        config.stash[_LEFT_OUT] = len(left_out)
-
-
-def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    count = config.stash.get(_LEFT_OUT, 0)
-    if count:
-        terminalreporter.write_line(f"{count} tests deselected: {_DATA_REASON}")
-
-
-_LEFT_OUT = pytest.StashKey[int]()
 
 
 class Ros:
@@ -153,8 +130,3 @@ def joint_rows(ros: Ros) -> Callable[..., list[tuple[str, str, int, bytes]]]:
         return made
 
     return rows
-
-
-@pytest.fixture
-def data_folder() -> Path:
-    return Path(os.environ["FRIC_DATA"])

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from fric_nodes.bagio import BagError, read_record
 from fric_nodes.errors import InputError
 from fric_nodes.record import Record
@@ -158,7 +157,7 @@ def test_topic_without_messages(write_bag: Any, ros: Any) -> None:
 def test_effort_missing(write_bag: Any, joint_rows: Any) -> None:
     bag = write_bag(joint_rows(effort=None))
     refused(bag, "no effort: /joint_states has none for joint 'axis' and there is no topic /force_command")
-    refused(bag, "has no effort in /joint_states; use the force command", effort="joint_states")
+    refused(bag, "has no effort in /joint_states; read the force command", effort="joint_states")
     refused(bag, "no topic /force_command", effort="command")
 
 
@@ -193,7 +192,9 @@ def repaired(path: Path, match: str) -> Record:
 def test_not_finite(write_bag: Any, joint_rows: Any, value: float, signal: str) -> None:
     bad = {20, 21, 40}
     options: dict[str, Any] = {signal: lambda k: value if k in bad else float(k)}
-    record = repaired(write_bag(joint_rows(**options)), rf"{signal} is not finite \(NaN or inf\) at 3 of 100 samples, first at 0\.020 s")
+    record = repaired(
+        write_bag(joint_rows(**options)), rf"{signal} is not finite \(NaN or inf\) at 3 of 100 samples, first at 0\.020 s"
+    )
     assert record.n_samples == 97
     assert record.time[20] == pytest.approx(0.022)
 
@@ -211,7 +212,9 @@ def test_stamp_repeats(write_bag: Any, joint_rows: Any) -> None:
         stamps[30] = stamps[29]
         stamps[60] = stamps[59]
 
-    record = repaired(write_bag(joint_rows(stamps=stamps_with(change))), r"2 of 100 stamps repeat an earlier one, first at sample 30")
+    record = repaired(
+        write_bag(joint_rows(stamps=stamps_with(change))), r"2 of 100 stamps repeat an earlier one, first at sample 30"
+    )
     np.testing.assert_allclose(record.position, np.delete(np.arange(100), [30, 60]) * 1e-3)
 
 
@@ -219,7 +222,9 @@ def test_stamps_jump_forward(write_bag: Any, joint_rows: Any) -> None:
     def change(stamps: list[int]) -> None:
         stamps[40:] = [stamp + 3600 * 10**9 for stamp in stamps[40:]]
 
-    record = repaired(write_bag(joint_rows(stamps=stamps_with(change))), r"time jumps by \+3600\.001 s after sample 39 \(at 0\.039 s\)")
+    record = repaired(
+        write_bag(joint_rows(stamps=stamps_with(change))), r"time jumps by \+3600\.001 s after sample 39 \(at 0\.039 s\)"
+    )
     np.testing.assert_allclose(record.position, np.arange(40, 100) * 1e-3)
     assert record.time[0] == 0.0
 
@@ -244,7 +249,9 @@ def test_gap_is_marked_and_kept(write_bag: Any, joint_rows: Any) -> None:
     def change(stamps: list[int]) -> None:
         stamps[40:] = [stamp + 200 * MS for stamp in stamps[40:]]
 
-    record = repaired(write_bag(joint_rows(stamps=stamps_with(change))), r"1 gap\(s\) in the samples, the longest 0\.201 s at 0\.039 s")
+    record = repaired(
+        write_bag(joint_rows(stamps=stamps_with(change))), r"1 gap\(s\) in the samples, the longest 0\.201 s at 0\.039 s"
+    )
     assert record.n_samples == 100
     assert record.valid is not None
     np.testing.assert_array_equal(np.flatnonzero(~record.valid), [39, 40])

@@ -9,11 +9,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from scipy.io import savemat
-
 from fric_nodes.bagio import BagError, ImportingError, import_recording, load_mapping, read_record, write_record
 from fric_nodes.bagio.units import unit
 from fric_nodes.record import Record, Units
+from scipy.io import savemat
 
 N = 50
 TIME = np.arange(N) * 0.01
@@ -86,11 +85,10 @@ def test_parquet_with_dates(tmp_path: Path) -> None:
     check(import_recording(file, MAP))
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t", " ", "|"])
-@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), *((separator, decimal) for separator in ";\t |" for decimal in ".,")]
+)
 def test_text_in_many_hands(tmp_path: Path, separator: str, decimal: str) -> None:
-    if separator == decimal:
-        pytest.skip("a comma cannot be both the delimiter and the decimal sign")
     check(import_recording(table(tmp_path / "a.csv", separator, decimal), MAP))
 
 
@@ -129,7 +127,9 @@ def test_signals_from_several_files(tmp_path: Path) -> None:
     effort = {"from": "volts", "scale": 10, "offset": 1, "unit": "N", "file": "more/b.csv"}
     check(import_recording(tmp_path / "a.csv", {**MAP, "effort": effort}))
     table(tmp_path / "more" / "b.csv", head="time,where,volts\n", rows=N - 1)
-    with pytest.raises(ImportingError, match=f"signal 'position' has {N} samples, time has {N - 1}|has {N - 1} samples, time has {N}"):
+    with pytest.raises(
+        ImportingError, match=f"signal 'position' has {N} samples, time has {N - 1}|has {N - 1} samples, time has {N}"
+    ):
         import_recording(tmp_path / "a.csv", {**MAP, "effort": effort})
 
 
@@ -209,12 +209,21 @@ def test_import_to_a_bag_and_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"position": {"from": "xx", "unit": "mm"}}, "'position' is to come from 'xx', which is not there.*columns there: t, x, u"),
+        (
+            {"position": {"from": "xx", "unit": "mm"}},
+            "'position' is to come from 'xx', which is not there.*columns there: t, x, u",
+        ),
         ({"position": {"from": 3, "unit": "mm"}}, "is to come from '3', which is not there"),
-        ({"position": {"from": "x", "unit": "N"}}, "'position' has the unit 'N', which is no unit of length or angle; use one of m,"),
+        (
+            {"position": {"from": "x", "unit": "N"}},
+            "'position' has the unit 'N', which is no unit of length or angle; use one of m,",
+        ),
         ({"effort": {"from": "u", "unit": "mm"}}, "'effort' has the unit 'mm', which is no unit of force or torque"),
         ({"effort": {"from": "u", "unit": ""}}, "'effort' has the unit ''"),
-        ({"effort": {"from": "u", "unit": "N", "scale": "gain"}}, "scale of signal 'effort' is 'gain', which is no scalar variable"),
+        (
+            {"effort": {"from": "u", "unit": "N", "scale": "gain"}},
+            "scale of signal 'effort' is 'gain', which is no scalar variable",
+        ),
         ({"velocity": {"from": "u", "unit": "rad/s"}}, "position is in m but velocity in a unit of rad"),
         ({"extra": {"position": {"from": "u", "unit": "V"}}}, "extra signal has the name of a usual one: position"),
         ({"postion": {"from": "x", "unit": "mm"}}, "unknown key 'postion', the closest is 'position'"),
@@ -234,7 +243,8 @@ def test_mapping_that_does_not_fit(tmp_path: Path, change: dict[str, Any], messa
 
 
 def test_mapping_from_yaml_names_the_line(tmp_path: Path) -> None:
-    text = "joint: slide\ntime: {from: t, unit: s}\nposition: {from: x, unit: mm}\neffort:\n  from: u\n  scale: 10\n  offset: 1\n  unit: N\n"
+    text = "joint: slide\ntime: {from: t, unit: s}\nposition: {from: x, unit: mm}\n"
+    text += "effort:\n  from: u\n  scale: 10\n  offset: 1\n  unit: N\n"
     good = tmp_path / "map.yaml"
     good.write_text(text)
     check(import_recording(table(tmp_path / "a.csv"), good))
@@ -285,7 +295,7 @@ def test_checks_of_bags_hold_for_files(tmp_path: Path) -> None:
         import_recording(file, MAP)
     time[20] = np.nan
     np.savez(file, t=time, x=POSITION_MM, u=VOLTS)
-    with pytest.raises(ImportingError, match="time is not finite .* at 1 of 50 samples, first at row 20"):
+    with pytest.raises(ImportingError, match=r"time is not finite .* at 1 of 50 samples, first at row 20"):
         import_recording(file, MAP)
     repaired = import_recording(file, MAP, repair=True)
     np.testing.assert_allclose(repaired.time, np.delete(TIME, 20), atol=1e-12)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from fric_nodes.bagio import read_record, read_series
 from fric_nodes.record import Units
 
@@ -32,7 +31,9 @@ with BagWriter(sys.argv[1], storage=sys.argv[2], compression=sys.argv[3], metada
 """
 
 
-@pytest.mark.parametrize(("storage", "compression"), [("mcap", "none"), ("mcap", "zstd"), ("sqlite3", "none"), ("sqlite3", "zstd")])
+@pytest.mark.parametrize(
+    ("storage", "compression"), [("mcap", "none"), ("mcap", "zstd"), ("sqlite3", "none"), ("sqlite3", "zstd")]
+)
 def test_killed_recorder(tmp_path: Path, storage: str, compression: str) -> None:
     path = tmp_path / "bag"
     command = [sys.executable, "-c", RECORDER, str(path), storage, compression]

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from fric_nodes.bagio import BagError, Topics, bag_info, iterate_raw, read_record, read_series
 from fric_nodes.record import Units
 
@@ -100,6 +99,20 @@ def test_topic_under_a_namespace(write_bag: Any, joint_rows: Any) -> None:
     assert read_record(both, topics=Topics(joint_states="/right/joint_states")).n_samples == 100
 
 
+def test_topics_of_one_axis_stay_together(write_bag: Any, ros: Any, joint_rows: Any) -> None:
+    rows = []
+    for k, axis in enumerate(("left", "right")):
+        rows += joint_rows(effort=None, topic=f"/{axis}/joint_states")
+        rows += [(f"/{axis}/force_command", F64, START, ros.float64(1.0 + k))]
+    bag = write_bag(rows)
+    record = read_record(bag, topics=Topics(joint_states="/right/joint_states", force_command="/right/force_command"))
+    assert set(record.effort) == {2.0}
+    with pytest.raises(BagError, match="several that end like it: /left/force_command, /right/force_command"):
+        read_record(bag, topics=Topics(joint_states="/right/joint_states"))
+    alone = write_bag([row for row in rows if not row[0].startswith("/left/joint")], name="alone")
+    assert set(read_record(alone).effort) == {2.0}
+
+
 def commanded(ros: Any, joint_rows: Any, stamped: bool, shift_ns: int = 0) -> Any:
     """Joint states without effort each ms, commands each 4 ms from 8 ms on: 0, 1, 2 ... N."""
     rows = joint_rows(effort=None, stamps=[START + shift_ns + k * MS for k in range(100)])
@@ -174,7 +187,9 @@ def test_reference_outside_its_range_and_in_gaps_stands(write_bag: Any, ros: Any
         rows.append(("/reference", REF, stamp, ros.reference(stamp, float(k), 1000.0)))
     reference = read_record(write_bag(rows)).reference
     assert reference is not None
-    expected = np.concatenate([np.full(100, 100.0), np.arange(100, 200), np.full(200, 199.0), np.arange(400, 500), np.full(100, 499.0)])
+    expected = np.concatenate(
+        [np.full(100, 100.0), np.arange(100, 200), np.full(200, 199.0), np.arange(400, 500), np.full(100, 499.0)]
+    )
     np.testing.assert_allclose(reference, expected, atol=1e-9)
 
 

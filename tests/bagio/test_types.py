@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
-from rosbags.typesys import get_types_from_msg
-
 from fric_nodes.bagio import WriteError
 from fric_nodes.bagio.types import DEFINITIONS, definition, type_fields
+from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
+from rosbags.typesys import get_types_from_msg
 
 MESSAGES = Path(__file__).parents[2] / "fric_interfaces" / "msg"
 

@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import Reader
-
 from fric_nodes.bagio import BagError, BagWriter, WriteError, bag_info, iterate_raw, read_record, read_series, write_record
 from fric_nodes.bagio import write as write_module
 from fric_nodes.record import Record, Units
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import Reader
 
 JS, F64 = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
 STORAGES = [("mcap", "none"), ("mcap", "zstd"), ("sqlite3", "none"), ("sqlite3", "zstd")]
@@ -99,7 +98,7 @@ def test_nothing_is_left_when_writing_fails(record: Record, tmp_path: Path, monk
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(write_module, "_write_messages", fail)
-    with pytest.raises(WriteError, match="out: cannot be created .*No space left"):
+    with pytest.raises(WriteError, match=r"out: cannot be created .*No space left"):
         write_record(record, tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
 

@@ -1,8 +1,8 @@
 """Erasing the padding of CDR messages, so that equal messages are equal bytes.
 
-Fields are aligned to their own size, and the bytes skipped for that are whatever happened to be in the sender's buffer: the same
-joint state, published twice, seldom gives the same bytes. They mean nothing, but whoever compares two recordings, or looks for
-retransmissions, would see differences. Here they become zero.
+Fields are aligned to their own size, and the bytes skipped for that are whatever happened to be in the sender's buffer: the
+same joint state, published twice, may give different bytes. They mean nothing, but whoever compares two recordings, or looks
+for retransmissions, would see differences. Here they become zero.
 """
 
 from __future__ import annotations

@@ -157,6 +157,7 @@ class _Reading:
         self.repair = repair
         self.notes = list(source.notes)
         self.by_log = time == "log"
+        self.refused: dict[str, BagError] = {}
 
     def record(self, joint: str | None, units: Units | None) -> Record:
         custom = self.source.custom
@@ -207,11 +208,15 @@ class _Reading:
             if role == "force_command" and self.effort_from == "joint_states":
                 continue
             name = getattr(self.topics, role, f"/{role}")
+            # The axis whose joint states are read has its other topics under the same namespace.
+            beside = _namespace(roles, self.topics) + name
+            name = beside if any(topic.name == beside for topic in have) else name
             try:
                 roles[role], note = pick_topic(where, have, name, msgtypes, role)
-            except BagError:
+            except BagError as error:
                 if role in needed:
                     raise
+                self.refused[role] = error
                 continue
             self.notes += [note] if note else []
         found = collect(self.source, list(roles.values()))
@@ -230,9 +235,12 @@ class _Reading:
             raise BagError(
                 self.where,
                 f"joint '{states.joint}' has no effort in {states.topic}",
-                "use the force command with --effort command, or record the effort",
+                "read the force command in its place, or record the effort",
             )
         if "force_command" not in raw:
+            refusal = self.refused.get("force_command")
+            if refusal is not None and not refusal.problem.startswith(f"no topic {self.topics.force_command} in the bag"):
+                raise refusal  # it is there, but not as it is needed
             raise BagError(
                 self.where,
                 f"no effort: {states.topic} has none for joint '{states.joint}' and there is no topic "
@@ -322,6 +330,12 @@ class _Reading:
             position=custom.get("fric.position_unit", default.position),
             force=custom.get("fric.force_unit", default.force),
         )
+
+
+def _namespace(roles: dict[str, Topic], topics: Topics) -> str:
+    """What stands before the usual name of the joint states in the name they were found under."""
+    states = roles.get("joint_states")
+    return states.name.removesuffix(topics.joint_states) if states and states.name.endswith(topics.joint_states) else ""
 
 
 def _stamp(of: Series) -> Stamps:

@@ -1,4 +1,7 @@
-"""Benchmarks that a user can run: ``fric bench``. One file each, with a constant ``BENCHMARK``; every number of the README comes from here."""
+"""Benchmarks that a user can run with ``fric bench``: one file each, with a constant ``BENCHMARK``.
+
+Every figure of speed in the README comes from here.
+"""
 
 from __future__ import annotations
 

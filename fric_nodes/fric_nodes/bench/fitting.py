@@ -41,7 +41,9 @@ def _recording() -> Record:
     motion = simulate(truth, effort, 1e-3, n_substeps=4)
     resolution = 1e-7
     position = np.round(motion.position / resolution) * resolution
-    return Record(at, position, effort + 0.5 * generator.standard_normal(_N_SAMPLES), effort_hold="following", source="benchmark")
+    return Record(
+        at, position, effort + 0.5 * generator.standard_normal(_N_SAMPLES), effort_hold="following", source="benchmark"
+    )
 
 
 def run() -> list[Figure]:

@@ -22,7 +22,10 @@ def run() -> list[Figure]:
         term("viscous", coefficient=10.0),
         term("stribeck", force=2.0, velocity=0.01),
     ]
-    structures = {"Coulomb, viscous, Stribeck, exact stick": static, "with LuGre": [*static, term("presliding", stiffness=1e5, damping=100.0)]}
+    structures = {
+        "Coulomb, viscous, Stribeck, exact stick": static,
+        "with LuGre": [*static, term("presliding", stiffness=1e5, damping=100.0)],
+    }
     effort = 12.0 * np.sin(np.arange(_N_STEPS) * 4.4e-3)
     figures = []
     for name, terms in structures.items():

@@ -37,7 +37,11 @@ def bench(
         progress(f"measuring {BENCHMARKS[name].title}")
         figures += BENCHMARKS[name].run()
     if as_json:
-        typer.echo(json.dumps([{"name": f.name, "value": f.value, "unit": f.unit, "goal": f.goal, "reached": f.reached} for f in figures]))
+        typer.echo(
+            json.dumps(
+                [{"name": f.name, "value": f.value, "unit": f.unit, "goal": f.goal, "reached": f.reached} for f in figures]
+            )
+        )
     else:
         table = Table(box=None, pad_edge=False)
         table.add_column("figure")
@@ -45,7 +49,9 @@ def bench(
         table.add_column("goal")
         for figure in figures:
             mark = "" if figure.reached is None else " reached" if figure.reached else " missed"
-            table.add_row(figure.name, f"{figure.value:.4g} {figure.unit}", f"{figure.goal} {figure.unit}{mark}" if figure.goal else "")
+            table.add_row(
+                figure.name, f"{figure.value:.4g} {figure.unit}", f"{figure.goal} {figure.unit}{mark}" if figure.goal else ""
+            )
         Console(highlight=False).print(table)
     if any(figure.reached is False for figure in figures):
         raise typer.Exit(1)

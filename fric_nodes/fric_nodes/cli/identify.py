@@ -37,26 +37,44 @@ _DEFAULT_TERMS = "coulomb,viscous,bias"
 
 def register(app: typer.Typer) -> None:
     """Add the verb to ``app``."""
-    app.command("identify", no_args_is_help=True, epilog="Example: fric identify bags/slide --validate bags/slide_2 --out found")(
-        identify
-    )
+    app.command(
+        "identify", no_args_is_help=True, epilog="Example: fric identify bags/slide --validate bags/slide_2 --out found"
+    )(identify)
 
 
 def identify(
     train: Annotated[list[Path], typer.Argument(help="Recordings to fit: rosbag2 folders or files.")],
     out: OutOption = Path("identified"),
-    validate: Annotated[list[Path] | None, typer.Option("--validate", help="Recording kept apart from the fit; may be repeated.")] = None,
-    model: Annotated[Path | None, typer.Option("--model", help="Model file whose terms to fit and whose values to start from.")] = None,
-    terms: Annotated[str, typer.Option("--terms", help="Effects to fit when no model file is given, separated by commas.")] = _DEFAULT_TERMS,
-    method: Annotated[str, typer.Option("--method", help="inverse-dynamics, or output-error (which starts from it).")] = "inverse-dynamics",
+    validate: Annotated[
+        list[Path] | None, typer.Option("--validate", help="Recording kept apart from the fit; may be repeated.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", help="Model file whose terms to fit and whose values to start from.")
+    ] = None,
+    terms: Annotated[
+        str, typer.Option("--terms", help="Effects to fit when no model file is given, separated by commas.")
+    ] = _DEFAULT_TERMS,
+    method: Annotated[
+        str, typer.Option("--method", help="inverse-dynamics, or output-error (which starts from it).")
+    ] = "inverse-dynamics",
     joint: JointOption = None,
-    cutoff: Annotated[float | None, typer.Option("--cutoff", help="Low-pass filter on the position [Hz]; a tenth of the rate, at most 100.")] = None,
-    decimation: Annotated[int | None, typer.Option("--decimation", help="Keep every n-th filtered equation; rate over cutoff.")] = None,
-    rest_velocity: Annotated[float | None, typer.Option("--rest-velocity", help="A joint that stays slower than this rests [m/s or rad/s].")] = None,
+    cutoff: Annotated[
+        float | None, typer.Option("--cutoff", help="Low-pass filter on the position [Hz]; a tenth of the rate, at most 100.")
+    ] = None,
+    decimation: Annotated[
+        int | None, typer.Option("--decimation", help="Keep every n-th filtered equation; rate over cutoff.")
+    ] = None,
+    rest_velocity: Annotated[
+        float | None, typer.Option("--rest-velocity", help="A joint that stays slower than this rests [m/s or rad/s].")
+    ] = None,
     hold: Annotated[list[str] | None, typer.Option("--hold", help="Hold this parameter at its value; may be repeated.")] = None,
     free: Annotated[list[str] | None, typer.Option("--free", help="Fit this shape parameter too; may be repeated.")] = None,
-    robust: Annotated[bool, typer.Option("--robust", help="Weigh down outliers (Huber) instead of plain least squares.")] = False,
-    horizon: Annotated[float | None, typer.Option("--horizon", help="Length of the free runs of output-error [s]; the whole recording.")] = None,
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Weigh down outliers (Huber) instead of plain least squares.")
+    ] = False,
+    horizon: Annotated[
+        float | None, typer.Option("--horizon", help="Length of the free runs of output-error [s]; the whole recording.")
+    ] = None,
     repair: RepairOption = False,
     time: TimeOption = "stamp",
     start: StartOption = None,
@@ -172,12 +190,17 @@ def _summary(result: Identification) -> dict[str, Any]:
 
 
 def _write(
-    out: Path, result: Identification, records: list[Record], validation: list[Record], options: Options, summary: dict[str, Any]
+    out: Path,
+    result: Identification,
+    records: list[Record],
+    validation: list[Record],
+    options: Options,
+    summary: dict[str, Any],
 ) -> None:
     """All three results, or none: they are made before the first is written."""
+    from ..files import write_text
     from ..model_file import write_model
     from ..report.identification import identification_report
-    from ..report.page import write_text
 
     page = identification_report(result, records, validation, options)
     write_text(out / "identification.json", json.dumps(summary, indent=2) + "\n")

@@ -27,15 +27,23 @@ def import_(
     as_json: JsonOption = False,
 ) -> None:
     """Turn a recording into a rosbag2 that every other verb reads."""
-    from ..bagio.importing import import_recording, read_mapping
+    from ..bagio.importing import import_recording, load_mapping
     from ..bagio.write import write_record
 
-    record = import_recording(file, read_mapping(mapping), repair=repair)
+    record = import_recording(file, load_mapping(mapping), repair=repair)
     write_record(record, out, storage=storage)
     if as_json:
-        summary = {"bag": str(out), "joint": record.joint, "samples": record.n_samples, "duration": record.duration, "notes": record.notes}
+        summary = {
+            "bag": str(out),
+            "joint": record.joint,
+            "samples": record.n_samples,
+            "duration": record.duration,
+            "notes": record.notes,
+        }
         typer.echo(json.dumps(summary))
         return
-    typer.echo(f"{out}: joint '{record.joint}', {record.n_samples} samples, {record.duration:.2f} s at {1 / record.sample_time:.4g} Hz")
+    typer.echo(
+        f"{out}: joint '{record.joint}', {record.n_samples} samples, {record.duration:.2f} s at {1 / record.sample_time:.4g} Hz"
+    )
     for note in record.notes:
         typer.echo(f"- {note}")

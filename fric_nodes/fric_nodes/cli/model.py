@@ -39,7 +39,14 @@ def show(
 
     model = read_model(file)
     rows = [
-        (p.name, p.declaration.symbol, p.value, model.standard_errors.get(p.name), p.declaration.unit(model.units), p.declaration.doc)
+        (
+            p.name,
+            p.declaration.symbol,
+            p.value,
+            model.standard_errors.get(p.name),
+            p.declaration.unit(model.units),
+            p.declaration.doc,
+        )
         for p in model.parameters()
     ]
     if as_json:
@@ -53,7 +60,14 @@ def show(
     for held in model.terms:
         console.print(f"  {held.effect.title}: {held.effect.equation}  ({held.effect.source})", markup=False)
     table = Table(box=None, pad_edge=False)
-    for name, justify in (("parameter", "left"), ("symbol", "left"), ("value", "right"), ("std", "right"), ("unit", "left"), ("", "left")):
+    for name, justify in (
+        ("parameter", "left"),
+        ("symbol", "left"),
+        ("value", "right"),
+        ("std", "right"),
+        ("unit", "left"),
+        ("", "left"),
+    ):
         table.add_column(name, justify=justify)  # type: ignore[arg-type]
     for name, symbol, value, error, unit, doc in rows:
         table.add_row(name, symbol, f"{value:.6g}", "" if error is None else f"{error:.2g}", unit, doc)

@@ -69,7 +69,9 @@ def read_all(paths: list[Path], options: ReadOptions) -> list[Record]:
     for entry in options.topics:
         role, found, name = entry.partition("=")
         if not found or role not in Topics.__dataclass_fields__:
-            raise InputError("--topic", f"'{entry}' is not ROLE=NAME", f"use a role of {', '.join(Topics.__dataclass_fields__)}")
+            raise InputError(
+                "--topic", f"'{entry}' is not ROLE=NAME", f"use a role of {', '.join(Topics.__dataclass_fields__)}"
+            )
         names[role] = name
     return [
         screened(

@@ -9,7 +9,17 @@ from typing import Annotated
 
 import typer
 
-from .options import EndOption, JointOption, JsonOption, ReadOptions, RepairOption, StartOption, TimeOption, TopicOption, read_all
+from .options import (
+    EndOption,
+    JointOption,
+    JsonOption,
+    ReadOptions,
+    RepairOption,
+    StartOption,
+    TimeOption,
+    TopicOption,
+    read_all,
+)
 
 __all__ = ["register"]
 
@@ -17,13 +27,17 @@ __all__ = ["register"]
 def register(app: typer.Typer) -> None:
     """Add the verb to ``app``."""
     app.command(
-        "simulate", no_args_is_help=True, epilog="Example: fric simulate identified/model.yaml --force bags/slide --out bags/simulated"
+        "simulate",
+        no_args_is_help=True,
+        epilog="Example: fric simulate identified/model.yaml --force bags/slide --out bags/simulated",
     )(simulate)
 
 
 def simulate(
     model: Annotated[Path, typer.Argument(help="A fric-model/1 file.")],
-    force: Annotated[Path, typer.Option("--force", help="Recording whose force leads the model, and whose motion it is compared with.")],
+    force: Annotated[
+        Path, typer.Option("--force", help="Recording whose force leads the model, and whose motion it is compared with.")
+    ],
     out: Annotated[Path, typer.Option("--out", help="Folder of the bag to write; must not exist.")],
     joint: JointOption = None,
     repair: RepairOption = False,

@@ -1,7 +1,8 @@
 """A graph of node processes: started, watched, stopped, and their words kept.
 
-Nodes are children of this process, each an interpreter of its own, on a ROS domain of their own that doesn't leave this machine. A
-child that ends early with an error, or hangs, ends the run with its last words; whatever happens, no child outlives the graph.
+Nodes are children of this process, each an interpreter of its own, on a ROS domain of their own that doesn't leave this
+machine. A child that ends early with an error, or hangs, ends the run with its last words; whatever happens, no child
+outlives the graph.
 """
 
 from __future__ import annotations
@@ -115,7 +116,9 @@ class Graph:
         while self._children[name].poll() is None:
             self.check()
             if time.monotonic() > end:
-                raise GraphError(name, f"did not finish within {timeout:.0f} s", f"see {self._logs / name}.log. {self._last_words(name)}")
+                raise GraphError(
+                    name, f"did not finish within {timeout:.0f} s", f"see {self._logs / name}.log. {self._last_words(name)}"
+                )
             time.sleep(0.02)
         if self._children[name].returncode != 0:
             self._failed(name)

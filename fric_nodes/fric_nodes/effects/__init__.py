@@ -5,8 +5,8 @@ A new effect is one new module with a constant ``EFFECT``, and its test. Nothing
 
 from __future__ import annotations
 
-from ..registry import discover
 from ..effect import Effect
+from ..registry import discover
 
 __all__ = ["EFFECTS", "by_name"]
 

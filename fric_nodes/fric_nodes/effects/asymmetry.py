@@ -32,7 +32,9 @@ EFFECT = Effect(
     equation="F = D_C + D_v |v|, on top of F_C sgn(v) + F_v v",
     source="de Marchi 1998, asymmetric kinetic and viscous friction",
     parameters=(
-        Parameter("force", "D_C", "F", "half the difference of the Coulomb levels, forward minus backward", default=0.0, linear=True),
+        Parameter(
+            "force", "D_C", "F", "half the difference of the Coulomb levels, forward minus backward", default=0.0, linear=True
+        ),
         Parameter(
             "coefficient",
             "D_v",
@@ -46,6 +48,6 @@ EFFECT = Effect(
     force=force,
     regime="one direction of motion against the other, at the same speed",
     looks_like={
-        "bias": "push the resting body from both sides: a bias shifts both break-away forces the same way, asymmetric friction doesn't push"
+        "bias": "push the resting body from both sides: a bias shifts both break-away forces alike, asymmetric friction doesn't push"
     },
 )

@@ -23,15 +23,13 @@ __all__ = ["EFFECT"]
 
 
 @kernel
-def slip(
-    z: Any, z_next: Any, i: int, v: float, h: float, level: float, stiffness: float, damping: float
-) -> float:
+def slip(z: Any, z_next: Any, i: int, v: float, h: float, level: float, stiffness: float, damping: float) -> float:
     z_0 = z[i]
     if level <= 0.0:
         z_next[i] = 0.0
         return 0.0
     r = stiffness * abs(v) * h / level
-    if r < 1e-8:  # noqa: PLR2004 - the limit of the expressions below, free of cancellation
+    if r < 1e-8:  # the limit of the expressions below, free of cancellation
         z_1 = z_0 + (v - stiffness * abs(v) / level * z_0) * h
         z_mean = 0.5 * (z_0 + z_1)
     else:
@@ -63,5 +61,7 @@ EFFECT = Effect(
     n_states=1,
     rate=_rate,
     regime="the first micrometres after each reversal and around rest",
-    looks_like={"compliance": "measure the position on the load side too: a compliant transmission moves the motor, not the load"},
+    looks_like={
+        "compliance": "measure the position on the load side too: a compliant transmission moves the motor, not the load"
+    },
 )

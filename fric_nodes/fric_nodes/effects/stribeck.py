@@ -23,7 +23,7 @@ def level(c: Context, base: float, force: float, velocity: float, exponent: floa
     # The common exponents skip the general power, which costs more than the rest of a step together.
     if exponent == 1.0:
         return base + force * math.exp(-ratio)
-    if exponent == 2.0:  # noqa: PLR2004
+    if exponent == 2.0:
         return base + force * math.exp(-ratio * ratio)
     return base + force * math.exp(-(ratio**exponent))
 
@@ -42,5 +42,7 @@ EFFECT = Effect(
     ),
     level=level,
     regime="low speed, both directions: more force than at moderate speed",
-    looks_like={"dwell_time": "repeat reversals with rests of graded length: only dwell time makes break-away depend on the rest"},
+    looks_like={
+        "dwell_time": "repeat reversals with rests of graded length: only dwell time makes break-away depend on the rest"
+    },
 )

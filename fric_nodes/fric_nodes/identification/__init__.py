@@ -1,6 +1,7 @@
 """Identification: parameters from recordings, with honest uncertainty.
 
-Every method is one file with a constant ``METHOD`` and the same contract: ``fit(structure, records, options) -> Identification``.
+Every method is one file with a constant ``METHOD`` and the same contract: ``fit(structure, records, options) ->
+Identification``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """From a recording to the equations of inverse dynamics: filtered motion, matching force, decimated, edges and rest marked.
 
-The position is low-pass filtered without phase (Butterworth, forward and backward) and differentiated by central differences; the
-force is shifted to the sample's own instant according to how the recording holds it; both sides of u = f(q, v, a) then pass the same
-zero-phase decimation filter, so that no phase comes between them (the "parallel decimation" of Gautier 1997).
+The position is low-pass filtered without phase (Butterworth, forward and backward) and differentiated by central
+differences; the force is shifted to the sample's own instant according to how the recording holds it; both sides of u =
+f(q, v, a) then pass the same zero-phase decimation filter, so that no phase comes between them (the "parallel decimation"
+of Gautier 1997).
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ def equations(records: list[Record], options: Options) -> Equations:
             f"cutoff of {cutoff:g} Hz for a recording at {rate:.4g} Hz",
             f"choose a cutoff between 0 and {0.5 * rate:.4g} Hz",
         )
-    decimation = max(int(round(rate / cutoff)), 1) if options.decimation is None else options.decimation
+    decimation = max(round(rate / cutoff), 1) if options.decimation is None else options.decimation
     edge = int(np.ceil(_EDGE_PERIODS / cutoff * rate))
     for record in records:
         notes += [f"{record.source}: {note}" for note in record.notes]
@@ -137,7 +138,9 @@ def equations(records: list[Record], options: Options) -> Equations:
     sliding = ~np.concatenate(resting)
     rest_time = float(np.sum(~sliding)) * decimation / rate
     if rest_time > 0:
-        notes.append(f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) don't count for sliding friction")
+        notes.append(
+            f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) don't count for sliding friction"
+        )
     return Equations(tuple(stretches), thin, np.concatenate(force), velocity, time, starts, sliding, rest, tuple(notes))
 
 

@@ -1,7 +1,7 @@
 """Which parameters a fit may move, between which bounds, and from which start values it tries.
 
-Start values are chosen by dimension from what the recording holds (a velocity between the slowest and the fastest motion, a stiffness
-from friction level and travel), never by the name of an effect, so that a new effect needs nothing here.
+Start values are chosen by dimension from what the recording holds (a velocity between the slowest and the fastest motion,
+a stiffness from friction level and travel), never by the name of an effect, so that a new effect needs nothing here.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
 """Inverse dynamics: the force equation u = f(q, v, a) solved for the parameters, from filtered motion.
 
-For a structure whose force is linear in its parameters this is least squares on the regressors (Gautier and Khalil; Janot, Gautier,
-Brunot 2019 for the EMPS axis), with bounds, and with Huber weights against spikes where asked for. Nonlinear parameters (a Stribeck velocity, a bristle
-stiffness) are tried over a grid of sensible values, the linear ones solved for at each (separable least squares), and then all are
-refined together. The regressors are the model's own compiled terms with one parameter set to one, so nothing is typed twice.
+For a structure whose force is linear in its parameters this is least squares on the regressors (Gautier and Khalil; Janot,
+Gautier, Brunot 2019 for the EMPS axis), with bounds, and with Huber weights against spikes where asked for. Nonlinear
+parameters (a Stribeck velocity, a bristle stiffness) are tried over a grid of sensible values, the linear ones solved for
+at each (separable least squares), and then all are refined together. The regressors are the model's own compiled terms
+with one parameter set to one, so nothing is typed twice.
 
-Samples at rest don't enter a fit of sliding friction: there the friction is whatever balances the drive, and sgn(v) is noise. A structure
-with pre-sliding describes them and uses them.
+Samples at rest don't enter a fit of sliding friction: there the friction is whatever balances the drive, and sgn(v) is
+noise. A structure with pre-sliding describes them and uses them.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ def predicted(model: Model, found: Equations) -> Array:
 
 
 def regressors(model: Model, found: Equations) -> Array:
-    """One column per parameter of ``model`` in which its force is linear; zero columns elsewhere, ``(n_rows, n_parameters)``."""
+    """One column per parameter in which the force is linear, zero elsewhere, shape ``(n_rows, n_parameters)``."""
     linear = np.array([parameter.declaration.linear for parameter in model.parameters()])
     base = np.where(linear, 0.0, model.values)
     columns = np.zeros((found.force.shape[0], linear.shape[0]))
@@ -146,9 +147,7 @@ def _search_dynamic(model: Model, found: Equations, free: FreeParameters, robust
     return best
 
 
-def _refine(
-    model: Model, found: Equations, free: FreeParameters, use: Mask, robust: bool
-) -> tuple[Model, Array, Array, Array]:
+def _refine(model: Model, found: Equations, free: FreeParameters, use: Mask, robust: bool) -> tuple[Model, Array, Array, Array]:
     """All free parameters together by trust-region least squares: model, residual, Jacobian and weights at the optimum."""
     start = model.values
     scale = np.maximum(np.abs(start[free.index]), 1e-3 * _typical(model, found, free))
@@ -192,12 +191,16 @@ def _typical(model: Model, found: Equations, free: FreeParameters) -> Array:
     return np.array([sizes.get(dimensions[number], 1.0) for number in free.index])
 
 
-def fit_force(model: Model, records: Sequence[Record], options: Options) -> tuple[Model, FreeParameters, Array, Equations, list[str]]:
+def fit_force(
+    model: Model, records: Sequence[Record], options: Options
+) -> tuple[Model, FreeParameters, Array, Equations, list[str]]:
     """The fit itself: model, what was fitted, covariance, the equations and warnings about what was not."""
     found = equations(list(records), options)
     if int(np.sum(found.sliding)) < 2 * len(model.names):
         raise IdentificationError(
-            records[0].source, "the joint hardly moves", f"record motion faster than {found.rest_velocity:.3g} {model.units.position}/s"
+            records[0].source,
+            "the joint hardly moves",
+            f"record motion faster than {found.rest_velocity:.3g} {model.units.position}/s",
         )
     free = FreeParameters.of(model, options)
     static = model.with_terms(held for held in model.terms if held.effect.slip is None)

@@ -1,19 +1,19 @@
 """Online identification: recursive least squares on the same equations as offline, with forgetting only where there is news.
 
-Samples are gathered into blocks, each block goes through the same zero-phase filters, regressors and decimation as a whole recording
-(:mod:`fric_nodes.identification.equations`), and every row updates the estimate. Offline and online values therefore differ by their
-weighting in time and by nothing else; the price is a latency of one block and two filter edges.
+Samples are gathered into blocks, each block goes through the same zero-phase filters, regressors and decimation as a whole
+recording (:mod:`fric_nodes.identification.equations`), and every row updates the estimate. Offline and online values
+therefore differ by their weighting in time and by nothing else; the price is a latency of one block and two filter edges.
 
 Forgetting is directional (Cao and Schwartz 2000): with information matrix R and regressor phi
 
     R <- R - (1 - lambda) R phi phi' R / (phi' R phi) + phi phi',
 
-so that old information fades only along directions in which new information comes in. A parameter that the motion does not excite
-keeps its value and its standard error, however long the axis rests or repeats itself: no wind-up, no drift.
+so that old information fades only along directions in which new information comes in. A parameter that the motion does not
+excite keeps its value and its standard error, however long the axis rests or repeats itself: no wind-up, no drift.
 
-The covariance is the sandwich R^-1 S R^-1, with S the forgetting sum of score products over blocks of time: correlated residuals, which
-every real axis has, widen the intervals as they should. While there are too few blocks for that, the white-noise formula
-widened by the residuals' first autocorrelation stands in.
+The covariance is the sandwich R^-1 S R^-1, with S the forgetting sum of score products over blocks of time: correlated
+residuals, which every real axis has, widen the intervals as they should. While there are too few blocks for that, the
+white-noise formula widened by the residuals' first autocorrelation stands in.
 """
 
 from __future__ import annotations
@@ -209,7 +209,8 @@ class OnlineIdentifier:
         if along > 0.0:
             self._information -= (1.0 - forgetting) / along * np.outer(image, image)
         self._information += np.outer(phi, phi)
-        # Scaled, since the columns differ by orders of magnitude; the pseudo-inverse leaves directions without information alone.
+        # Scaled, since the columns differ by orders of magnitude; the pseudo-inverse leaves directions without information
+        # alone.
         scale = np.sqrt(np.maximum(np.diag(self._information), 1e-300))
         gain = np.linalg.pinv(self._information / np.outer(scale, scale), rcond=1e-9, hermitian=True) @ (phi / scale) / scale
         self._values = self._values + gain * residual
@@ -284,9 +285,7 @@ class OnlineIdentifier:
         found = self.estimate()
         by_name = dict(zip(found.names, found.values.tolist(), strict=True))
         errors = {
-            name: error
-            for name, error in zip(found.names, found.standard_errors.tolist(), strict=True)
-            if math.isfinite(error)
+            name: error for name, error in zip(found.names, found.standard_errors.tolist(), strict=True) if math.isfinite(error)
         }
         values = np.array([by_name.get(p.name, p.value) for p in self._whole.parameters()])
         return self._whole.with_values(values, errors)

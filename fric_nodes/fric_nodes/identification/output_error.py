@@ -1,9 +1,9 @@
 """Output error: the parameters whose simulated motion, led by the measured force alone, comes closest to the measured one.
 
-Minimises sum (q - q_hat)^2 over free runs of the compiled simulation, from the values that inverse dynamics finds, by trust-region
-least squares. With the whole recording as one run this is the published test of an axis model; on an axis whose position drifts
-away under small force errors, shorter runs (``horizon``) start again from the measured state, their friction state led along the
-measured motion, so that no error builds up through the integrator.
+Minimises sum (q - q_hat)^2 over free runs of the compiled simulation, from the values that inverse dynamics finds, by
+trust-region least squares. With the whole recording as one run this is the published test of an axis model; on an axis
+whose position drifts away under small force errors, shorter runs (``horizon``) start again from the measured state, their
+friction state led along the measured motion, so that no error builds up through the integrator.
 Source: Ljung 1999, chapter 7 (output error); the runs' start states are those of the filtered recording.
 """
 
@@ -41,7 +41,7 @@ def _runs(stretches: Sequence[Stretch], horizon: float | None) -> list[_Run]:
     runs = []
     for stretch in stretches:
         n = stretch.time.shape[0]
-        length = n if horizon is None else max(int(round(horizon / stretch.sample_time)), 10)
+        length = n if horizon is None else max(round(horizon / stretch.sample_time), 10)
         runs += [_Run(stretch, first, min(first + length + 1, n)) for first in range(0, n - 1, length)]
     return [run for run in runs if run.last - run.first > 2]
 
@@ -57,7 +57,9 @@ def _errors(model: Model, runs: Sequence[_Run]) -> Array:
             if leader is None or leader[0] is not s:
                 leader = (s, Predictor(model))
             simulator.friction_state[:] = leader[1].friction_state
-            leader[1].run(s.time[part][:-1], s.position[part][:-1], s.velocity[part][:-1], s.acceleration[part][:-1], s.sample_time)
+            leader[1].run(
+                s.time[part][:-1], s.position[part][:-1], s.velocity[part][:-1], s.acceleration[part][:-1], s.sample_time
+            )
         states, _ = simulator.run(intervals(s.effort[part], s.hold), s.sample_time)
         errors.append(states[:, 0] - s.raw_position[part][1:])
     return np.concatenate(errors)
@@ -101,7 +103,9 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     model = start.with_values(values, inverse_dynamics.standard_errors(free, covariance))
     warnings, status = warnings_of(model, free, covariance)
     if answer.status <= 0:
-        status = "not converged after 100 steps; start from values nearer to the machine's (--model), or shorten the runs (--horizon)"
+        status = (
+            "not converged after 100 steps; start nearer to the machine's values (--model), or shorten the runs (--horizon)"
+        )
     return Identification(
         model=model,
         fitted=free.names,

@@ -18,8 +18,8 @@ __all__ = ["free_run", "score"]
 def score(model: Model, records: Sequence[Record], options: Options, found: Equations | None = None) -> Score:
     """Score of ``model`` on ``records``: every valid sample counts but those at rest, whatever weight a fit gave it.
 
-    At rest a static friction law leaves the force open, so that there is nothing to compare; leaving rest out for every structure keeps
-    the scores of different structures comparable.
+    At rest a static friction law leaves the force open, so that there is nothing to compare; leaving rest out for every
+    structure keeps the scores of different structures comparable.
 
     Args:
         model: with its values.
@@ -55,7 +55,7 @@ def score(model: Model, records: Sequence[Record], options: Options, found: Equa
 
 
 def free_run(model: Model, stretch: Stretch) -> Array:
-    """Position of ``model`` [x], shape ``(n,)``, led by the measured force alone from the stretch's first position and velocity."""
+    """Position of ``model`` [x], shape ``(n,)``, led by the measured force alone from the stretch's first state."""
     motion = simulate(
         model,
         stretch.effort,

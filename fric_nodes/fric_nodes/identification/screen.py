@@ -1,8 +1,9 @@
 """What in a recording is not the free axis: end stops and saturated drives, recognised, left out and named.
 
-End stop: the joint stands at one end of its travel although the force pushes outward harder than it ever had to while the joint moved
-that way. Saturation: the force stays at its extreme with sharp corners. A smooth peak is as flat as that near its top, but it widens: the time
-that a parabola spends within four tolerances of its top is twice the time within one, that of a clipped signal hardly longer.
+End stop: the joint stands at one end of its travel although the force pushes outward harder than it ever had to while the
+joint moved that way. Saturation: the force stays at its extreme with sharp corners. A smooth peak is as flat as that near
+its top, but it widens: the time that a parabola spends within four tolerances of its top is twice the time within one,
+that of a clipped signal hardly longer.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _WIDENING = 1.4  # between 1 for a clipped signal and 2 for a parabola
 
 
 def screened(record: Record) -> Record:
-    """``record`` with what is not the free axis marked invalid and named in its notes; the record itself when nothing is found."""
+    """``record`` with what is not the free axis marked invalid and named in its notes."""
     bad = np.zeros(record.n_samples, dtype=np.bool_)
     notes: list[str] = []
     for finder in (_end_stops, _saturation):
@@ -47,7 +48,7 @@ def _end_stops(record: Record) -> Iterator[tuple[int, int, str]]:
     travel = float(np.ptp(position))
     if travel == 0.0:
         return
-    width = max(int(round(0.05 / record.sample_time)), 1)
+    width = max(round(0.05 / record.sample_time), 1)
     # A difference over 50 ms: slow enough for encoder steps, fast enough to see the stop.
     velocity = np.zeros_like(position)
     velocity[width:-width] = (position[2 * width :] - position[: -2 * width]) / (time[2 * width :] - time[: -2 * width])
@@ -63,7 +64,7 @@ def _end_stops(record: Record) -> Iterator[tuple[int, int, str]]:
             push = float(np.max(outward * effort[first:last]))
             if time[last - 1] - time[first] < _SHORTEST or push < needed + 0.1 * spread:
                 continue
-            around = int(round(_MARGIN / record.sample_time))
+            around = round(_MARGIN / record.sample_time)
             yield (
                 max(first - around, 0),
                 min(last + around, record.n_samples),

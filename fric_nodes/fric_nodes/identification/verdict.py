@@ -1,8 +1,8 @@
 """What a recording could not tell, said before and after a fit.
 
-Before: parameters whose columns are the same but for a factor (a bias and an asymmetric Coulomb level while sliding) can't be told
-apart; the later one is held and named, with the experiment that would separate them. After: parameters with large standard errors,
-strong correlations, or values at a bound.
+Before: parameters whose columns are the same but for a factor (a bias and an asymmetric Coulomb level while sliding) can't
+be told apart; the later one is held and named, with the experiment that would separate them. After: parameters with large
+standard errors, strong correlations, or values at a bound.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def _twin_message(model: Model, name: str, others: list[str], value: float) -> s
     if not others:
         return f"{name} leaves no trace in this recording and is held at {value:g}: excite what it depends on"
     message = f"{name} can't be told from {' and '.join(others)} in this recording and is held at {value:g}"
-    effect = name.split(".")[0].split("#")[0]
+    effect = name.split(".", maxsplit=1)[0].split("#", maxsplit=1)[0]
     related = {other.split(".")[0].split("#")[0] for other in others}
     for held in model.terms:
         for other, experiment in held.effect.looks_like.items():
@@ -106,4 +106,7 @@ def warnings_of(model: Model, free: FreeParameters, covariance: Array) -> tuple[
                 warnings.append(f"{pair} are coupled (correlation {correlation[i, j]:+.3f}): only a combination is known")
     if unsure:
         return warnings, f"converged; not to be relied on: {', '.join(unsure)}. Excite them more, or leave their terms out"
-    return warnings, "converged; every fitted parameter is determined to better than 20 %. Check it on a recording of its own (--validate)"
+    return (
+        warnings,
+        "converged; every fitted parameter is determined to better than 20 %. Check it on a recording of its own (--validate)",
+    )

@@ -1,4 +1,4 @@
-"""Taking serialized messages in bulk, past the executor.
+"""Taking messages in bulk, past the executor.
 
 An executor of rclpy rebuilds its wait set for every round and starts a coroutine for every message, which costs in the order of
 100 us of processor time per message. A recorder or an identifier doesn't need to react to each message at once, so its
@@ -25,12 +25,12 @@ class Taken(NamedTuple):
     """A message as the middleware delivered it.
 
     Attributes:
-        payload: the serialized message.
+        payload: the serialized message, or the message itself when the subscription decodes.
         received: time of reception [ns since 1970].
         sequence: the publisher's own count of its messages, from 1; None when the middleware has none.
     """
 
-    payload: bytes
+    payload: Any
     received: int
     sequence: int | None
 
@@ -62,22 +62,24 @@ class _OffTheWaitSet(CallbackGroup):
 
 
 class BulkSubscription:
-    """A subscription to serialized messages that is emptied on demand.
+    """A subscription that is emptied on demand.
 
     Args:
         node: the node that subscribes.
         msgtype: such as ``sensor_msgs/msg/JointState``.
         topic: name of the topic.
         qos: quality of service; its depth bounds what may come between two calls of :meth:`take`.
+        raw: give the bytes as they came; otherwise the decoded messages, at some 10 us each.
 
     Raises:
         ImportError: the message type is not installed.
     """
 
-    def __init__(self, node: Node, msgtype: str, topic: str, qos: QoSProfile) -> None:
+    def __init__(self, node: Node, msgtype: str, topic: str, qos: QoSProfile, *, raw: bool = True) -> None:
         self.topic = topic
         self.msgtype = msgtype
         self.qos = qos
+        self._raw = raw
         self._class = message_class(msgtype)
         self._node = node
         self._group = _OffTheWaitSet()
@@ -89,7 +91,7 @@ class BulkSubscription:
             callback_group=self._group,
             # Event handlers are waitables of their own and would cost the wait set what was saved above.
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-            raw=True,
+            raw=raw,
         )
 
     def take(self, limit: int) -> Iterator[Taken]:
@@ -98,7 +100,7 @@ class BulkSubscription:
         take: Callable[[Any, bool], Any] = handle.take_message
         with handle:
             for _ in range(limit):
-                taken = take(self._class, True)
+                taken = take(self._class, self._raw)
                 if taken is None:
                     return
                 payload, info = taken

@@ -12,7 +12,6 @@ import time
 from contextlib import ExitStack
 from typing import Any
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
@@ -46,8 +45,8 @@ class LeanExecutor(SingleThreadedExecutor):
         """Hold the handles of all entities and make a wait set that fits them."""
         self._release()
         nodes = self.get_nodes()
-        self._subscriptions = [s for n in nodes for s in n.subscriptions if _may_run(s.callback_group)]
-        self._timers = [t for n in nodes for t in n.timers if _may_run(t.callback_group)]
+        self._subscriptions = [s for n in nodes for s in n.subscriptions if self.can_execute(s)]
+        self._timers = [t for n in nodes for t in n.timers if self.can_execute(t)]
         self._services = [s for n in nodes for s in n.services]
         self._clients = [c for n in nodes for c in n.clients]
         guards = [self._guard, self._sigint_gc, *(g for n in nodes for g in n.guards)]
@@ -132,8 +131,3 @@ class LeanExecutor(SingleThreadedExecutor):
         """Stop, and let go of the nodes' entities."""
         self._release()
         return bool(super().shutdown(timeout_sec))
-
-
-def _may_run(group: CallbackGroup | None) -> bool:
-    """False for a group that keeps its entities off every wait set."""
-    return group is None or bool(group.can_execute(None))

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import signal
-import sys
 import threading
 import time
 from pathlib import Path
 from typing import Any
 
-import rclpy
 from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
 from rosbags.interfaces import Qos
 from rosgraph_msgs.msg import Clock
 
@@ -24,6 +19,7 @@ from ..bagio.errors import BagError
 from ..bagio.read import bag_info, iterate_raw
 from ..errors import InputError
 from .bulk import message_class
+from .orderly import run
 from .parameters import NodeParameter, NodeParameterError, Settings
 from .playback import Due, Pace, recorded_qos, schedule
 
@@ -72,6 +68,8 @@ class PlayerNode(Node):
         self.published = 0
         """Messages published so far."""
         self._time = self.create_publisher(Clock, "/clock", 10) if settings.flag("clock") else None
+        self._thread: threading.Thread | None = None
+        self._refusal: InputError | None = None
         self._stamped: set[str] = set()
         self._publishers_of: dict[str, Publisher] = {}
         self._total = 0
@@ -95,6 +93,35 @@ class PlayerNode(Node):
                 self._stamped.add(topic.msgtype)
             self._publishers_of[name] = self.create_publisher(kind, name, _playing_qos(offered.get(name), topic.msgtype))
             self._total += topic.n_messages
+
+    def begin(self) -> None:
+        """Play in a thread of its own, so that the pace doesn't depend on what the executor has to do."""
+
+        def work() -> None:
+            try:
+                self.play()
+            except InputError as error:
+                self._refusal = error
+
+        self._thread = threading.Thread(target=work, name="play")
+        self._thread.start()
+
+    @property
+    def done(self) -> bool:
+        """True when the playing that was begun has ended."""
+        return self._thread is not None and not self._thread.is_alive()
+
+    def close(self) -> None:
+        """End the playing.
+
+        Raises:
+            InputError: what kept it from being played.
+        """
+        self.stop.set()
+        if self._thread is not None:
+            self._thread.join()
+        if self._refusal is not None:
+            raise self._refusal
 
     def play(self) -> bool:
         """Publish the recording, as often as was asked for; True when it was published to its end.
@@ -120,10 +147,10 @@ class PlayerNode(Node):
                 if not (pace.wait(due.time_ns) if pace else self._throttle()):
                     return False
                 self._publish(due)
-            self._settle()
             late = f", at most {pace.worst_delay * 1e3:.1f} ms late" if pace else ""
             self.get_logger().info(f"played {self.published} messages{late}")
             if not settings.flag("loop"):
+                self._settle()
                 return True
             self.published = 0
 
@@ -184,37 +211,14 @@ def _playing_qos(recorded: Qos | None, msgtype: str) -> QoSProfile:
 
 
 def main(args: list[str] | None = None) -> None:
-    """Play a bag to its end; exit status 0 also when stopped by SIGINT or SIGTERM, 2 when the bag cannot be played."""
-    refusal: list[InputError] = []
-    # The signals only ask for an end (see recorder): the last messages are then still delivered.
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    try:
+    """Play a bag to its end; exit status 0 also when stopped by a signal, 2 when the bag cannot be played."""
+
+    def make() -> PlayerNode:
         node = PlayerNode()
+        node.begin()
+        return node
 
-        def work() -> None:
-            try:
-                node.play()
-            except InputError as error:
-                refusal.append(error)
-
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: node.stop.set())
-        # The main thread serves parameters and services, so that the pace does not depend on them.
-        playing = threading.Thread(target=work, name="play")
-        playing.start()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        while playing.is_alive():
-            executor.spin_once(timeout_sec=0.1)
-        playing.join()
-        node.destroy_node()
-    except InputError as error:
-        refusal.append(error)
-    finally:
-        rclpy.try_shutdown()
-    if refusal:
-        sys.stderr.write(f"player: {refusal[0]}\n")
-        sys.exit(2)
+    run("player", make, args)
 
 
 if __name__ == "__main__":

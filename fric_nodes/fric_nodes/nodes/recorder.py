@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import signal
-import sys
-import threading
 import time
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..bagio.errors import WriteError
 from ..bagio.padding import PaddingEraser
 from ..bagio.types import type_fields
 from ..bagio.write import BagWriter
-from ..errors import InputError
 from .bulk import BulkSubscription, message_class, offered_qos
 from .message_order import ReceiveOrder, StampOrder, TopicIntake
+from .orderly import run
 from .parameters import NodeParameter, NodeParameterError, Settings
 from .qos import DIAGNOSTICS
 
@@ -187,6 +181,11 @@ class RecorderNode(Node):
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
 
+    @property
+    def done(self) -> bool:
+        """Never: a recorder records until it is stopped."""
+        return False
+
     def close(self) -> None:
         """Take what is still in the queues, write it all and close the bag."""
         self.drain()
@@ -203,25 +202,7 @@ def _receives_as_well(present: QoSProfile, offered: QoSProfile) -> bool:
 
 def main(args: list[str] | None = None) -> None:
     """Record until SIGINT or SIGTERM, then close the bag; exit status 2 when the bag cannot be written."""
-    # rclpy's own handlers would shut the context down, and with it the queues that are still to be written, and could
-    # interrupt a write half-way. So a signal only sets a flag here, which is looked at between two rounds of the executor.
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        node = RecorderNode()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        while not stop.is_set():
-            executor.spin_once(timeout_sec=0.1)
-        node.close()
-        node.destroy_node()
-    except InputError as error:
-        sys.stderr.write(f"recorder: {error}\n")
-        sys.exit(2)
-    finally:
-        rclpy.try_shutdown()
+    run("recorder", RecorderNode, args)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
@@ -17,11 +18,12 @@ def share_file(name: str) -> Path:
     Raises:
         InputError: neither place has it.
     """
-    places = [Path(__file__).resolve().parents[3]]
+    installed = Path(sys.prefix) / "share" / "fric_nodes"
+    places = [installed, Path(__file__).resolve().parents[3]]
     try:
         places.insert(0, Path(get_package_share_directory("fric_nodes")))
-    except PackageNotFoundError:
-        pass
+    except (PackageNotFoundError, OSError):
+        pass  # an installation by pip sets no AMENT_PREFIX_PATH, and needs none
     for place in places:
         if (place / name).is_file():
             return place / name

@@ -148,7 +148,9 @@ def demo_report(outcome: DemoOutcome) -> str:
         clock = f"Lock-step at {1 / outcome.period:.0f} Hz: the plant waits for every command, so that the result doesn't depend on this machine"
         clock += f" ({outcome.rate:.0f} samples per second were reached)." if outcome.rate else "."
     else:
-        clock = f"Wall time at {1 / outcome.period:.0f} Hz, on this machine as it is; deadlines missed are counted in the tables."
+        clock = (
+            f"Wall time at {1 / outcome.period:.0f} Hz, on this machine as it is; deadlines missed are counted in the tables."
+        )
     steps = [
         "Five node processes were started: plant, excitation, compensator, PID and recorder. The identifier knows nothing of the plant's friction.",
         f"The axis followed a reference under the PID alone; everything was recorded to {outcome.before.bag}.",
@@ -163,7 +165,10 @@ def demo_report(outcome: DemoOutcome) -> str:
             (
                 tiles(
                     [
-                        (f"{gain:.0f} ×", f"less tracking error: {micrometres(outcome.before.rms)} to {micrometres(outcome.after.rms)} RMS"),
+                        (
+                            f"{gain:.0f} ×",
+                            f"less tracking error: {micrometres(outcome.before.rms)} to {micrometres(outcome.after.rms)} RMS",
+                        ),
                         (f"{unseen:.0f} ×", "less on a motion not seen before"),
                         (
                             f"{outcome.result.train.relative_force_error_percent:.2g} %",
@@ -174,8 +179,18 @@ def demo_report(outcome: DemoOutcome) -> str:
             ),
         ),
         Section("What was done", (bullets(steps), paragraph(clock, "note"))),
-        _tracking("Tracking, the motion that was identified from", outcome.before, outcome.after, "Zoom with the mouse; double click to go back."),
-        _tracking("Tracking, a motion not seen before", outcome.unseen_before, outcome.unseen_after, "Another seed of the same kind of motion."),
+        _tracking(
+            "Tracking, the motion that was identified from",
+            outcome.before,
+            outcome.after,
+            "Zoom with the mouse; double click to go back.",
+        ),
+        _tracking(
+            "Tracking, a motion not seen before",
+            outcome.unseen_before,
+            outcome.unseen_after,
+            "Another seed of the same kind of motion.",
+        ),
         _curve(outcome),
         _parameters(outcome),
         Section(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import plotly.graph_objects as go
@@ -46,7 +47,7 @@ def thinned(x: Array, y: Array) -> tuple[Array, Array]:
         return x, y
     edges = np.linspace(0, n, _SLOTS + 1).astype(np.int64)
     keep = set()
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in pairwise(edges.tolist()):
         keep.add(first + int(np.argmin(y[first:last])))
         keep.add(first + int(np.argmax(y[first:last])))
     index = np.array(sorted(keep))

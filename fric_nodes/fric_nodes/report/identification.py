@@ -103,7 +103,10 @@ def _force_section(name: str, model: Model, found: Equations) -> Section:
                 ],
             ),
             (f"difference [{units.force}]", [Curve("measured minus predicted", found.time, found.force - predicted, "before")]),
-            (f"free run, position error [{units.position}]", [Curve("simulated minus measured position", time, np.concatenate(off), "second")]),
+            (
+                f"free run, position error [{units.position}]",
+                [Curve("simulated minus measured position", time, np.concatenate(off), "second")],
+            ),
         ],
         "time [s]",
     )
@@ -177,7 +180,12 @@ def identification_report(
         Section("Parameters", (parameter_table(result),)),
         Section(
             "Fit",
-            (table(("recording", "NOE", "relative force error", "force RMSE", "free-run position RMSE", "equations"), _score_rows(result)),),
+            (
+                table(
+                    ("recording", "NOE", "relative force error", "force RMSE", "free-run position RMSE", "equations"),
+                    _score_rows(result),
+                ),
+            ),
         ),
         _curve_section(result.model, found),
         _force_section("fitted recording", result.model, found),

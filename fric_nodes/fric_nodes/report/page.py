@@ -5,21 +5,17 @@ Every text that comes from a file, a bag or a user is escaped; only blocks made 
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, select_autoescape
 from plotly.offline import get_plotlyjs
 
-from ..errors import InputError
 
-__all__ = ["Section", "bullets", "figure", "paragraph", "preformatted", "render", "table", "tiles", "write_text"]
+__all__ = ["Section", "bullets", "figure", "paragraph", "preformatted", "render", "table", "tiles"]
 
 
 @dataclass(frozen=True)
@@ -47,11 +43,15 @@ def preformatted(text: str) -> str:
 
 def tiles(entries: Iterable[tuple[str, str]]) -> str:
     """Large figures with a caption each: ``(figure, caption)``."""
-    inner = "".join(f'<div class="tile"><b>{escape(value)}</b><span>{escape(caption)}</span></div>' for value, caption in entries)
+    inner = "".join(
+        f'<div class="tile"><b>{escape(value)}</b><span>{escape(caption)}</span></div>' for value, caption in entries
+    )
     return f'<div class="tiles">{inner}</div>'
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], text_columns: Sequence[int] = (0,), wrap: Sequence[int] = ()) -> str:
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], text_columns: Sequence[int] = (0,), wrap: Sequence[int] = ()
+) -> str:
     """A table; columns not in ``text_columns`` are set as numbers, those in ``wrap`` may break."""
 
     def kind(column: int) -> str:
@@ -93,20 +93,3 @@ def render(title: str, lead: str, sections: Iterable[Section]) -> str:
         plot_library=get_plotlyjs() if has_plots else "",
         footer=f"fric {release}. This page is one file: it opens without a network.",
     )
-
-
-def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write ``text`` to ``path``, all or nothing.
-
-    Raises:
-        InputError: the file can't be written.
-    """
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=target.parent, suffix=".tmp", delete=False, encoding="utf-8") as file:
-            file.write(text)
-        os.chmod(file.name, 0o644)
-        os.replace(file.name, target)
-    except OSError as error:
-        raise InputError(path, f"cannot be written ({error})", "choose a folder that you can write to") from None

@@ -1,0 +1,191 @@
+"""The demonstration from start to end: excite and record, identify, compensate, measure the gain, make the page.
+
+Only the recording is handed to the identification. The true axis is read by the plant's process, and at the end for the page.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..control.pid import PidGains
+from ..control.tuning import LoopMargins, tune
+from ..errors import InputError
+from ..files import write_text
+from ..identification import METHODS
+from ..identification.result import Identification, Options
+from ..identification.screen import screened
+from ..model import Model, build_model, term
+from ..model_file import read_model, write_model
+from ..report.demo import DemoOutcome, demo_report
+from ..shared_files import config_file
+from .graph import Graph, NodeSetup, free_domain
+from .outcome import Run, read_run
+
+__all__ = ["DemoSettings", "run_demo"]
+
+_FORCE_LIMIT = 80.0  # [N]
+_RESOLUTION = 1e-7  # [m], an optical linear encoder
+_FORCE_NOISE = 0.1  # [N], an eighth of a percent of the drive's peak
+_FILTER_TIME = 5e-4  # [s]
+# In wall time a command acts about one period after the measurement that it answers.
+_DELAY_PERIODS = {"lock-step": 0.0, "wall": 1.0}
+
+
+@dataclass(frozen=True)
+class DemoSettings:
+    """What to run.
+
+    Attributes:
+        out: folder for bags, model and page.
+        clock: ``lock-step`` or ``wall``.
+        rate: samples per second.
+        duration: of each motion [s].
+        seed: of motion and noise.
+    """
+
+    out: Path
+    clock: str = "lock-step"
+    rate: float = 500.0
+    duration: float = 20.0
+    seed: int = 1
+
+
+def _structure() -> Model:
+    """What the identifier assumes: which effects there may be, and nothing of their size."""
+    return build_model(
+        "rigid",
+        {"mass": 1.0},
+        [
+            term("coulomb", force=1.0),
+            term("stribeck", force=0.0, velocity=1.0),
+            term("asymmetry"),
+            term("viscous", coefficient=0.0),
+            term("bias", force=0.0),
+            term("presliding", stiffness=1.0),
+        ],
+    )
+
+
+def identify(bag: Path) -> Identification:
+    """The model found in ``bag``, from nothing but the recording."""
+    from ..bagio.read import read_record
+
+    record = screened(read_record(bag, repair=True))
+    return METHODS["inverse-dynamics"].fit(_structure(), [record], Options())
+
+
+def _nodes(settings: DemoSettings, gains: PidGains, seed: int, model: Path | None, bag: Path) -> list[NodeSetup]:
+    """The five nodes of one run, in the order in which they are started."""
+    loop: dict[str, object] = {"period": 1.0 / settings.rate, "lock_step": settings.clock == "lock-step"}
+    compensator = loop | {"enabled": model is not None} | ({} if model is None else {"model_file": model})
+    pid = loop | {
+        "kp": gains.proportional,
+        "ki": gains.integral,
+        "kd": gains.derivative,
+        "filter_time": gains.filter_time,
+        "force_limit": _FORCE_LIMIT,
+    }
+    excitation = loop | {"kinds": ["multisine"], "multisine.duration": settings.duration, "seed": seed}
+    plant = loop | {
+        "model_file": config_file("demo_axis.yaml"),
+        "resolution": _RESOLUTION,
+        "force_noise": _FORCE_NOISE,
+        "force_limit": _FORCE_LIMIT,
+        "seed": seed,
+        "duration": settings.duration + 1.0,
+    }
+    recorder = {"bag": bag, "log_time": "stamp" if settings.clock == "lock-step" else "receive"}
+    return [
+        NodeSetup("recorder", recorder),
+        NodeSetup("excitation", excitation),
+        NodeSetup("compensator", compensator),
+        NodeSetup("pid", pid),
+        NodeSetup("plant", plant),
+    ]
+
+
+def _run(settings: DemoSettings, gains: PidGains, seed: int, model: Path | None, name: str) -> tuple[Run, float | None]:
+    """One recorded run of the graph, and the lock-step rate that the plant reports."""
+    bag = settings.out / "bags" / name
+    with Graph(_nodes(settings, gains, seed, model, bag), settings.out / "logs" / name, free_domain()) as graph:
+        graph.wait_for("plant", timeout=60.0 + 10.0 * settings.duration)
+        graph.stop()
+        words = graph.text_of("plant")
+    found = re.search(r"(\d+(?:\.\d+)?) samples per second", words)
+    return read_run(bag, 1.0 / settings.rate), float(found.group(1)) if found else None
+
+
+def _described(gains: PidGains, margins: LoopMargins) -> tuple[dict[str, str], dict[str, str]]:
+    return (
+        {
+            "proportional gain": f"{gains.proportional:.4g} N/m",
+            "integral gain": f"{gains.integral:.4g} N/(m s)",
+            "derivative gain": f"{gains.derivative:.4g} N s/m",
+            "derivative filter": f"{1e3 * gains.filter_time:.2g} ms",
+        },
+        {
+            "gain margin": f"{margins.gain_margin:.2f}",
+            "phase margin": f"{margins.phase_margin:.1f}°",
+            "largest sensitivity": f"{margins.sensitivity:.2f}",
+            "crossover": f"{margins.crossover:.1f} Hz",
+        },
+    )
+
+
+def run_demo(settings: DemoSettings, tell: Callable[[str], None]) -> DemoOutcome:
+    """Run everything and write the page to ``out/report.html``; ``tell`` is given a line per step.
+
+    Raises:
+        InputError: a setting can't be used, the folder holds a demo already, or a node failed.
+    """
+    if settings.clock not in _DELAY_PERIODS:
+        raise InputError("--clock", f"'{settings.clock}' is not known", f"use one of {', '.join(_DELAY_PERIODS)}")
+    if (settings.out / "bags").exists():
+        raise InputError(settings.out, "holds the bags of an earlier run", "choose another --out, or remove it first")
+    truth = read_model(config_file("demo_axis.yaml"))
+    period = 1.0 / settings.rate
+    damping = truth.value("viscous.coefficient")
+    delay = _DELAY_PERIODS[settings.clock] * period
+    gains, margins = tune(truth.value("mass"), damping, period, delay=delay, filter_time=_FILTER_TIME)
+    tell("PID alone: the axis follows its reference, everything is recorded")
+    before, _ = _run(settings, gains, settings.seed, None, "before")
+    tell(f"identifying the friction from {before.bag}")
+    result = identify(before.bag)
+    model = settings.out / "model.yaml"
+    write_model(result.model, model)
+    tell("PID with the identified model: the same motion again")
+    after, rate = _run(settings, gains, settings.seed, model, "after")
+    tell("a motion that the identification has not seen, without and with the model")
+    unseen_before, _ = _run(settings, gains, settings.seed + 1000, None, "unseen_before")
+    unseen_after, _ = _run(settings, gains, settings.seed + 1000, model, "unseen_after")
+    described, margins_described = _described(gains, margins)
+    outcome = DemoOutcome(
+        clock=settings.clock,
+        period=period,
+        truth=truth,
+        result=result,
+        before=before,
+        after=after,
+        unseen_before=unseen_before,
+        unseen_after=unseen_after,
+        margins=margins_described,
+        gains=described,
+        commands=_commands(settings, gains, model),
+        rate=rate if settings.clock == "lock-step" else None,
+    )
+    write_text(settings.out / "report.html", demo_report(outcome))
+    return outcome
+
+
+def _commands(settings: DemoSettings, gains: PidGains, model: Path) -> list[str]:
+    """The run with the model as commands for five terminals."""
+    lines = []
+    for node in _nodes(settings, gains, settings.seed, model, settings.out / "bags" / "by_hand"):
+        rest = " ".join(node.command()[3:])
+        lines.append(f"fric node {node.name} {rest}")
+    terms = "coulomb,stribeck,asymmetry,viscous,bias,presliding"
+    lines.append(f"fric identify {settings.out / 'bags' / 'before'} --terms {terms} --out {settings.out / 'identified'}")
+    return lines
