@@ -10,7 +10,7 @@ from typing import Any
 
 from .effect import Context
 
-__all__ = ["RIGID", "drive", "force", "level", "level_sum", "slip", "step"]
+__all__ = ["RIGID", "drive", "force", "level", "level_sum", "slip", "step", "unpacked"]
 
 RIGID = True
 """True when no term has slip dynamics of its own, so that the contact sticks exactly."""
@@ -45,4 +45,9 @@ def step(
 
 def drive(p: Any, q: float, v: float, a: float) -> float:
     """Force that moves the plant against nothing but its inertia [F]."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def unpacked(p: Any) -> Any:
+    """The values ``p``, ``(n_parameters,)``, as a tuple: constants of a loop, where an array might change with every store."""
     raise AssertionError("a stand-in, see the module")

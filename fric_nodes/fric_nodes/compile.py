@@ -99,6 +99,8 @@ def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
         f'"""Assembled for: {plant.id} | {", ".join(effect.key for effect in effects) or "no terms"}."""',
         *imports,
         f"RIGID = {all(effect.slip is None for effect in effects)}",
+        "@kernel\ndef unpacked(p):",
+        f"    return ({''.join(f'p[{k}], ' for k in range(at))})",
         "@kernel\ndef level_sum(c, p):",
         *level,
         "    return total",

@@ -17,4 +17,4 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def kernel(function: Function) -> Function:
     """``function``, compiled at its first call, for use in a step loop."""
-    return cast(Function, njit(error_model="numpy", nogil=True)(function))
+    return cast(Function, njit(error_model="numpy", nogil=True, forceinline=True)(function))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .assembled import RIGID, drive, force, level_sum, slip, step
+from .assembled import RIGID, drive, force, level_sum, slip, step, unpacked
 from .effect import Context
 
 __all__ = ["predict", "simulate"]
@@ -25,6 +25,7 @@ def simulate(
     ``friction_out[k]`` the contact's mean friction force [F] over it. ``load`` and ``temperature`` hold one value, or one
     for each interval.
     """
+    p = unpacked(p)
     h_sub = h / n_sub
     x_next = np.empty_like(x)
     z_next = np.empty_like(z)
@@ -35,10 +36,13 @@ def simulate(
         for m in range(n_sub):
             t = t_0 + k * h + m * h_sub
             total += step(p, x, x_next, z, z_next, u[k], h_sub, t, load_k, temperature_k)
-            x[:] = x_next
+            for j in range(x.shape[0]):
+                x[j] = x_next[j]
             if not RIGID:
-                z[:] = z_next
-        x_out[k, :] = x
+                for j in range(z.shape[0]):
+                    z[j] = z_next[j]
+        for j in range(x.shape[0]):
+            x_out[k, j] = x[j]
         friction_out[k] = total / n_sub
 
 
@@ -50,6 +54,7 @@ def predict(
     Slip dynamics are led from half a step before each sample to half a step after it at the sample's velocity, so that the mean
     force over the step belongs to the sample itself and no half step of delay creeps in. ``z`` is led on in place.
     """
+    p = unpacked(p)
     z_next = np.empty_like(z)
     for k in range(q.shape[0]):
         load_k = load[k] if load.shape[0] > 1 else load[0]
@@ -60,6 +65,7 @@ def predict(
             friction = direction * level_sum(c, p)
         else:
             friction = slip(z, z_next, v[k], h, level_sum(c, p), p)
-            z[:] = z_next
+            for j in range(z.shape[0]):
+                z[j] = z_next[j]
         friction_out[k] = friction
         u_out[k] = drive(p, q[k], v[k], a[k]) + force(c, p) + friction

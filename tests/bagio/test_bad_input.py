@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +121,30 @@ def test_damaged_block_inside_shows_as_a_gap(write_bag: Any, joint_rows: Any, tm
     assert "1 gap(s)" in notes
     assert record.valid is not None
     assert np.count_nonzero(~record.valid) == 2
+
+
+def test_checksum_of_a_block_counts(write_bag: Any, joint_rows: Any) -> None:
+    stamps = [START + k * MS // 5 for k in range(30_000)]
+    bag = write_bag(joint_rows(30_000, stamps=stamps))
+    file = bag / "bag.mcap"
+    content = bytearray(file.read_bytes())
+    # rosbags writes no checksums: put in that of the second block (opcode 6), as other recorders do.
+    at, blocks = 8, []
+    while len(blocks) < 2:
+        opcode, size = struct.unpack_from("<BQ", content, at)
+        blocks += [at + 9] if opcode == 6 else []
+        at += 9 + size
+    start = blocks[1]
+    (length,) = struct.unpack_from("<Q", content, start + 32)
+    data = slice(start + 40, start + 40 + length)
+    struct.pack_into("<I", content, start + 24, zlib.crc32(content[data]))
+    file.write_bytes(content)
+    assert read_record(bag).n_samples == 30_000
+    content[start + 40 + length - 3] ^= 0x10  # in the last effort of the block
+    file.write_bytes(content)
+    record = read_record(bag, repair=True)
+    assert 10_000 < record.n_samples < 25_000
+    assert any("checksum" in note for note in record.notes)
 
 
 def test_broken_metadata_file_does_not_matter(write_bag: Any, joint_rows: Any) -> None:

@@ -76,6 +76,9 @@ def test_messages_out_of_order_in_the_file(write_bag: Any, joint_rows: Any) -> N
     rows = joint_rows()
     rows[10], rows[60] = rows[60], rows[10]
     np.testing.assert_array_equal(read_record(write_bag(rows)).position, np.arange(100) * 1e-3)
+    # Read record by record, they come in the order of the file.
+    folder = write_bag(rows, name="lone", storage="sqlite3")
+    np.testing.assert_array_equal(read_record(folder / "lone.db3").position, np.arange(100) * 1e-3)
 
 
 def test_zero_stamps_fall_back_on_reception(write_bag: Any, joint_rows: Any) -> None:
@@ -134,6 +137,16 @@ def test_effort_from_held_commands(write_bag: Any, ros: Any, joint_rows: Any, st
     notes = " | ".join(record.notes)
     assert "has no effort: taken from /force_command" in notes
     assert "8 samples before the first force command left out" in notes
+
+
+@pytest.mark.parametrize("time", ["stamp", "log"])
+def test_stamped_commands_beside_unstamped_joint_states(write_bag: Any, ros: Any, joint_rows: Any, time: Any) -> None:
+    rows = joint_rows(effort=None, stamps=[0] * 100)
+    for j in range(25):
+        # On another clock than that of the recorder, so that its stamps say nothing here.
+        rows.append(("/force_command", FORCE, START + 4 * j * MS, ros.force(5_000_000_000 + j, float(j))))
+    record = read_record(write_bag(rows), time=time)
+    np.testing.assert_array_equal(record.effort, np.repeat(np.arange(25.0), 4))
 
 
 def test_commands_that_stop_mark_the_rest(write_bag: Any, ros: Any, joint_rows: Any) -> None:

@@ -23,7 +23,6 @@ def demo(
     out: OutOption = Path("fric_demo"),
     clock: Annotated[str, typer.Option("--clock", help="lock-step, or wall for real time.")] = "lock-step",
     rate: Annotated[float, typer.Option("--rate", help="Samples per second.", min=10.0, max=5000.0)] = 500.0,
-    duration: Annotated[float, typer.Option("--duration", help="Length of each motion [s].", min=5.0, max=3600.0)] = 20.0,
     seed: Annotated[int, typer.Option("--seed", help="Of motion and noise.", min=0)] = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -35,7 +34,7 @@ def demo(
     def tell(text: str) -> None:
         progress(f"[{clock_of_wall.monotonic() - start:5.1f} s] {text}")
 
-    outcome = run_demo(DemoSettings(out, clock, rate, duration, seed), tell)
+    outcome = run_demo(DemoSettings(out, clock, rate, seed), tell)
     ratio = outcome.before.rms / outcome.after.rms
     unseen = outcome.unseen_before.rms / outcome.unseen_after.rms
     tell(f"tracking error {1e6 * outcome.before.rms:.3g} µm before, {1e6 * outcome.after.rms:.3g} µm after: {ratio:.1f} times less")

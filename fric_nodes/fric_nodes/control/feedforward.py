@@ -21,13 +21,18 @@ from ..errors import InputError
 from ..model import Model
 from ..simulate import Predictor
 
-__all__ = ["Feedforward", "FeedforwardError"]
+__all__ = ["Feedforward", "FeedforwardError", "prepare"]
 
 _LONGEST_STEP = 10.0  # periods: a longer pause of the reference is taken as a pause, not as motion
 
 
 class FeedforwardError(InputError):
     """A feedforward that can't be set up as asked."""
+
+
+def prepare(model: Model) -> None:
+    """Compile what ``model`` needs, or fetch it from the cache, which may take seconds; afterwards a change to it takes none."""
+    Predictor(model).step(0.0, 0.0, 0.0, 0.0, 1e-3)
 
 
 class _Voice:
@@ -113,19 +118,32 @@ class Feedforward:
         """The model in use, or coming into use."""
         return self._model
 
-    def set_model(self, model: Model | None, at_once: bool = False) -> None:
-        """Change to ``model`` (None: no force), over the transition time, or ``at_once``.
+    def selected(self, model: Model) -> Model:
+        """``model`` with those of its terms that are to be compensated.
 
         Raises:
             FeedforwardError: the model has none of an effect that was asked for.
         """
-        if model is not None and self._terms:
+        if self._terms:
             present = {held.effect.id for held in model.terms}
             missing = [name for name in self._terms if name not in present]
             if missing:
                 has = ", ".join(sorted(present)) or "none"
                 raise FeedforwardError("terms", f"the model has no '{missing[0]}'", f"choose among those it has: {has}")
             model = model.with_terms([held for held in model.terms if held.effect.id in self._terms])
+        return model
+
+    def set_model(self, model: Model | None, at_once: bool = False) -> None:
+        """Change to ``model`` (None: no force), over the transition time, or ``at_once``.
+
+        Call :func:`prepare` before, elsewhere, where a pause of the loop would hurt.
+
+        Raises:
+            FeedforwardError: the model has none of an effect that was asked for.
+        """
+        if model is not None:
+            model = self.selected(model)
+            prepare(model)
         self._model = model
         if at_once or self._transition_time <= 0.0:
             self._voices = [self._voice(model, 1.0)]

@@ -26,10 +26,8 @@ from .outcome import Run, read_run
 
 __all__ = ["DemoSettings", "run_demo"]
 
-_FORCE_LIMIT = 80.0  # [N]
-_RESOLUTION = 1e-7  # [m], an optical linear encoder
-_FORCE_NOISE = 0.1  # [N], an eighth of a percent of the drive's peak
-_FILTER_TIME = 5e-4  # [s]
+_FILTER_TIME = 5e-4  # [s] of the PID's derivative
+_MOTIONS = {"excitation": 44.5, "demo_motion": 21.5}  # parameter file of the motion: time of the axis until it has ended [s]
 # In wall time a command acts about one period after the measurement that it answers.
 _DELAY_PERIODS = {"lock-step": 0.0, "wall": 1.0}
 
@@ -42,14 +40,12 @@ class DemoSettings:
         out: folder for bags, model and page.
         clock: ``lock-step`` or ``wall``.
         rate: samples per second.
-        duration: of each motion [s].
         seed: of motion and noise.
     """
 
     out: Path
     clock: str = "lock-step"
     rate: float = 500.0
-    duration: float = 20.0
     seed: int = 1
 
 
@@ -77,7 +73,7 @@ def identify(bag: Path) -> Identification:
     return METHODS["inverse-dynamics"].fit(_structure(), [record], Options())
 
 
-def _nodes(settings: DemoSettings, gains: PidGains, seed: int, model: Path | None, bag: Path) -> list[NodeSetup]:
+def _nodes(settings: DemoSettings, gains: PidGains, motion: str, model: Path | None, bag: Path) -> list[NodeSetup]:
     """The five nodes of one run, in the order in which they are started."""
     loop: dict[str, object] = {"period": 1.0 / settings.rate, "lock_step": settings.clock == "lock-step"}
     compensator = loop | {"enabled": model is not None} | ({} if model is None else {"model_file": model})
@@ -86,35 +82,26 @@ def _nodes(settings: DemoSettings, gains: PidGains, seed: int, model: Path | Non
         "ki": gains.integral,
         "kd": gains.derivative,
         "filter_time": gains.filter_time,
-        "force_limit": _FORCE_LIMIT,
     }
-    excitation = loop | {"kinds": ["multisine"], "multisine.duration": settings.duration, "seed": seed}
-    plant = loop | {
-        "model_file": config_file("demo_axis.yaml"),
-        "resolution": _RESOLUTION,
-        "force_noise": _FORCE_NOISE,
-        "force_limit": _FORCE_LIMIT,
-        "seed": seed,
-        "duration": settings.duration + 1.0,
-    }
+    plant = loop | {"seed": settings.seed, "duration": _MOTIONS[motion]}
     recorder = {"bag": bag, "log_time": "stamp" if settings.clock == "lock-step" else "receive"}
     return [
         NodeSetup("recorder", recorder),
-        NodeSetup("excitation", excitation),
-        NodeSetup("compensator", compensator),
-        NodeSetup("pid", pid),
-        NodeSetup("plant", plant),
+        NodeSetup("excitation", loop | {"seed": settings.seed}, config_file(f"{motion}.yaml")),
+        NodeSetup("compensator", compensator, config_file("compensator.yaml")),
+        NodeSetup("pid", pid, config_file("pid.yaml")),
+        NodeSetup("plant", plant, config_file("plant.yaml")),
     ]
 
 
-def _run(settings: DemoSettings, gains: PidGains, seed: int, model: Path | None, name: str) -> tuple[Run, float | None]:
+def _run(settings: DemoSettings, gains: PidGains, motion: str, model: Path | None, name: str) -> tuple[Run, float | None]:
     """One recorded run of the graph, and the lock-step rate that the plant reports."""
     bag = settings.out / "bags" / name
-    with Graph(_nodes(settings, gains, seed, model, bag), settings.out / "logs" / name, free_domain()) as graph:
-        graph.wait_for("plant", timeout=60.0 + 10.0 * settings.duration)
+    with Graph(_nodes(settings, gains, motion, model, bag), settings.out / "logs" / name, free_domain()) as graph:
+        graph.wait_for("plant", timeout=60.0 + 10.0 * _MOTIONS[motion])
         graph.stop()
         words = graph.text_of("plant")
-    found = re.search(r"(\d+(?:\.\d+)?) samples per second", words)
+    found = re.search(r"(\d+(?:\.\d+)?) samples/s", words)
     return read_run(bag, 1.0 / settings.rate), float(found.group(1)) if found else None
 
 
@@ -151,16 +138,16 @@ def run_demo(settings: DemoSettings, tell: Callable[[str], None]) -> DemoOutcome
     delay = _DELAY_PERIODS[settings.clock] * period
     gains, margins = tune(truth.value("mass"), damping, period, delay=delay, filter_time=_FILTER_TIME)
     tell("PID alone: the axis follows its reference, everything is recorded")
-    before, _ = _run(settings, gains, settings.seed, None, "before")
+    before, _ = _run(settings, gains, "excitation", None, "excitation")
     tell(f"identifying the friction from {before.bag}")
     result = identify(before.bag)
     model = settings.out / "model.yaml"
     write_model(result.model, model)
     tell("PID with the identified model: the same motion again")
-    after, rate = _run(settings, gains, settings.seed, model, "after")
+    after, rate = _run(settings, gains, "excitation", model, "excitation_compensated")
     tell("a motion that the identification has not seen, without and with the model")
-    unseen_before, _ = _run(settings, gains, settings.seed + 1000, None, "unseen_before")
-    unseen_after, _ = _run(settings, gains, settings.seed + 1000, model, "unseen_after")
+    unseen_before, _ = _run(settings, gains, "demo_motion", None, "contour")
+    unseen_after, _ = _run(settings, gains, "demo_motion", model, "contour_compensated")
     described, margins_described = _described(gains, margins)
     outcome = DemoOutcome(
         clock=settings.clock,
@@ -183,9 +170,9 @@ def run_demo(settings: DemoSettings, tell: Callable[[str], None]) -> DemoOutcome
 def _commands(settings: DemoSettings, gains: PidGains, model: Path) -> list[str]:
     """The run with the model as commands for five terminals."""
     lines = []
-    for node in _nodes(settings, gains, settings.seed, model, settings.out / "bags" / "by_hand"):
+    for node in _nodes(settings, gains, "demo_motion", model, settings.out / "bags" / "by_hand"):
         rest = " ".join(node.command()[3:])
         lines.append(f"fric node {node.name} {rest}")
     terms = "coulomb,stribeck,asymmetry,viscous,bias,presliding"
-    lines.append(f"fric identify {settings.out / 'bags' / 'before'} --terms {terms} --out {settings.out / 'identified'}")
+    lines.append(f"fric identify {settings.out / 'bags' / 'excitation'} --terms {terms} --out {settings.out / 'identified'}")
     return lines

@@ -16,16 +16,23 @@ from ..parameter import Parameter
 
 __all__ = ["EFFECT"]
 
+_FALLEN = 80.0  # exp(-80) = 2e-35
+
 
 @kernel
 def level(c: Context, base: float, force: float, velocity: float, exponent: float) -> float:
     ratio = abs(c.velocity) / velocity
     # The common exponents skip the general power, which costs more than the rest of a step together.
-    if exponent == 1.0:
-        return base + force * math.exp(-ratio)
     if exponent == 2.0:
-        return base + force * math.exp(-ratio * ratio)
-    return base + force * math.exp(-(ratio**exponent))
+        fall = ratio * ratio
+    elif exponent == 1.0:
+        fall = ratio
+    else:
+        fall = ratio**exponent
+    # An exponential that underflows takes ten times as long as any other, and what is left of the surplus is beyond all precision.
+    if fall > _FALLEN:
+        return base
+    return base + force * math.exp(-fall)
 
 
 EFFECT = Effect(

@@ -7,19 +7,22 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.task import Future
 
 from .parameters import NodeParameter, Settings
+from .scheduling import settle_memory, use_realtime_scheduling
 from .timing import Deadlines, Reporter
 
-__all__ = ["COMMON", "LOCK_STEP", "PERIOD", "LoopNode"]
+__all__ = ["COMMON", "LOCK_STEP", "PERIOD", "LoopNode", "wait_until_sent", "wall_clock"]
 
 PERIOD = NodeParameter("period", 0.002, "sample period of the loop", "s", 1e-5, 10.0)
 LOCK_STEP = NodeParameter("lock_step", False, "count samples instead of time: the plant waits for the command to each sample")
 COMMON = (
     NodeParameter("joint", "axis", "name of the joint in joint states and models"),
+    NodeParameter("realtime_priority", 0, "wall time: SCHED_FIFO priority to ask the system for; 0: normal scheduling", "", 0, 99),
     NodeParameter("diagnostics_period", 1.0, "time between two reports on /diagnostics", "s", 0.01, 3600.0),
 )
 
@@ -51,7 +54,19 @@ class LoopNode(Node):  # type: ignore[misc]
         self.period = self.settings.number("period") if PERIOD in declarations else 0.0
         self.deadlines = Deadlines(0.0 if self.lock_step else self.period)
         self.finished: Future = Future()
-        self._reporter = Reporter(self, self.settings.number("diagnostics_period"), self.deadlines, self.counters, self.condition)
+        self._scheduling = "normal"
+        self._reporter = Reporter(self, self.settings.number("diagnostics_period"), self.deadlines, self.counters, self._all_conditions)
+
+    def settle(self) -> None:
+        """Called once before the loop starts, by a process that the node has for itself."""
+        settle_memory()
+        priority = self.settings.integer("realtime_priority")
+        if priority > 0 and not self.lock_step:
+            self._scheduling = use_realtime_scheduling(priority)
+            self.get_logger().info(f"scheduling: {self._scheduling}")
+
+    def _all_conditions(self) -> Mapping[str, str]:
+        return {"scheduling": self._scheduling, **self.condition()}
 
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report; overridden where there is something."""
@@ -78,6 +93,4 @@ def wall_clock() -> tuple[int, int]:
 
 def wait_until_sent(publisher: Publisher, seconds: float) -> None:
     """Give matched subscribers up to ``seconds`` [s] to receive the last message."""
-    from rclpy.duration import Duration
-
     publisher.wait_for_all_acked(Duration(seconds=seconds))

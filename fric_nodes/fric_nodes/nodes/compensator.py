@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
+from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
 from fric_interfaces.msg import FrictionModel, Reference, StampedForce
 from fric_interfaces.srv import LoadModel
+from rclpy.task import Future
 from std_msgs.msg import Float64
 
-from ..control.feedforward import Feedforward
+from ..control.feedforward import Feedforward, prepare
 from ..errors import InputError
 from ..model import Model
 from ..model_file import read_model
@@ -60,7 +63,9 @@ class CompensatorNode(LoopNode):
             enabled=settings.flag("enabled"),
         )
         if settings.text("model_file"):
-            self._use(read_model(settings.text("model_file")), at_once=True)
+            self._feedforward.set_model(self._checked(read_model(settings.text("model_file"))), at_once=True)
+        self._ready: deque[tuple[Model, Future]] = deque()
+        self.create_timer(0.05, self._take_over)
         settings.when_changed(self._on_settings)
         stamped = self.lock_step or settings.flag("stamped")
         self._message = StampedForce() if stamped else Float64()
@@ -89,24 +94,45 @@ class CompensatorNode(LoopNode):
 
     # Models
 
-    def _use(self, model: Model, at_once: bool = False) -> None:
+    def _checked(self, model: Model) -> Model:
         if model.joint != self.joint:
             raise InputError("model", f"is of joint '{model.joint}'", f"give one of joint '{self.joint}'")
-        self._feedforward.set_model(model, at_once)
-        self.counters["models"] += 1
+        return self._feedforward.selected(model)
+
+    def _prepare(self, model: Model) -> Future:
+        """Compile ``model`` on a thread of its own, while the loop goes on, then take it over; done when it is in use."""
+        done = Future(executor=self.executor)
+
+        def work() -> None:
+            try:
+                prepare(model)
+                self._ready.append((model, done))
+            except Exception as error:  # noqa: BLE001 - whatever it was, it belongs to who asked for the model
+                done.set_exception(error)
+
+        threading.Thread(target=work, daemon=True).start()
+        return done
+
+    def _take_over(self) -> None:
+        """Change to the models that are ready."""
+        while self._ready:
+            model, done = self._ready.popleft()
+            self._feedforward.set_model(model)
+            self.counters["models"] += 1
+            done.set_result(None)
 
     def _on_model(self, message: FrictionModel) -> None:
         if not self.settings.flag("follow_topic"):
             return
         try:
-            self._use(model_from_message(message))
+            self._prepare(self._checked(model_from_message(message)))
         except InputError as error:
             self.refuse("model", error)
 
-    def _on_load(self, request: LoadModel.Request, response: LoadModel.Response) -> LoadModel.Response:
+    async def _on_load(self, request: LoadModel.Request, response: LoadModel.Response) -> LoadModel.Response:
         try:
             model = read_model(request.path) if request.path else model_from_message(request.model)
-            self._use(model)
+            await self._prepare(self._checked(model))
             response.success, response.message = True, f"{model.plant.id} with {', '.join(model.prefixes) or 'no terms'}"
         except InputError as error:
             response.success, response.message = False, str(error)

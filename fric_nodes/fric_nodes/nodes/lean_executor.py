@@ -97,6 +97,15 @@ class LeanExecutor(SingleThreadedExecutor):
 
     def _spin_once_impl(self, timeout_sec: Any = None, *_: Any) -> None:
         """Wait for something to do, at most ``timeout_sec`` [s], and do all that is ready."""
+        try:
+            self._turn(timeout_sec)
+        except _rclpy.RCLError:
+            # A signal may end the context between any two calls; that is a shutdown and not a fault.
+            if self._context.ok():
+                raise
+            raise ExternalShutdownException from None
+
+    def _turn(self, timeout_sec: Any) -> None:
         if self._wait_set is None:
             self._known = self._signature()
             self._collect()

@@ -1,4 +1,4 @@
-"""The main function of nodes that have something to finish: a bag to close, last messages to deliver, a last estimate to publish.
+"""The main function of nodes that have something to finish: a bag to close, last messages to deliver, a last estimate.
 
 rclpy's own signal handlers shut the context down at once, and with it the queues that are still to be emptied, and an exception
 out of a handler may interrupt a write half-way. Here a signal only sets a flag, which is looked at between two rounds of the
@@ -11,10 +11,10 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from typing import Protocol
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from ..errors import InputError
@@ -22,13 +22,13 @@ from ..errors import InputError
 __all__ = ["OrderlyNode", "run"]
 
 
-class OrderlyNode(Protocol):
-    """What :func:`run` needs of a node besides being one."""
+class OrderlyNode(Node):
+    """A node that :func:`run` can serve."""
 
     @property
     def done(self) -> bool:
-        """True when the node's work has come to its end."""
-        ...
+        """True when the node's work has come to its end; never, unless the node says otherwise."""
+        return False
 
     def close(self) -> None:
         """Finish what has been begun.
@@ -36,11 +36,6 @@ class OrderlyNode(Protocol):
         Raises:
             InputError: the work failed.
         """
-        ...
-
-    def destroy_node(self) -> None:
-        """Leave the graph."""
-        ...
 
 
 def run(name: str, make: Callable[[], OrderlyNode], args: list[str] | None = None) -> None:

@@ -9,7 +9,6 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Qos
@@ -19,7 +18,7 @@ from ..bagio.errors import BagError
 from ..bagio.read import bag_info, iterate_raw
 from ..errors import InputError
 from .bulk import message_class
-from .orderly import run
+from .orderly import OrderlyNode, run
 from .parameters import NodeParameter, NodeParameterError, Settings
 from .playback import Due, Pace, recorded_qos, schedule
 
@@ -50,7 +49,7 @@ class NoSubscribersError(InputError):
     """Nobody subscribed to what is to be played."""
 
 
-class PlayerNode(Node):
+class PlayerNode(OrderlyNode):
     """Publishes the messages of a bag; nothing happens before :meth:`play`.
 
     Raises:

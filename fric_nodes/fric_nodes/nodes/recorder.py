@@ -10,7 +10,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -20,7 +19,7 @@ from ..bagio.types import type_fields
 from ..bagio.write import BagWriter
 from .bulk import BulkSubscription, message_class, offered_qos
 from .message_order import ReceiveOrder, StampOrder, TopicIntake
-from .orderly import run
+from .orderly import OrderlyNode, run
 from .parameters import NodeParameter, NodeParameterError, Settings
 from .qos import DIAGNOSTICS
 
@@ -53,7 +52,7 @@ _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _BATCH = 20_000  # messages taken from one topic in one round, so that a flood on one cannot starve the others
 
 
-class RecorderNode(Node):
+class RecorderNode(OrderlyNode):
     """Writes what is published on its topics into a bag, from its construction to :meth:`close`.
 
     Raises:
@@ -180,11 +179,6 @@ class RecorderNode(Node):
         array = DiagnosticArray(status=[status])
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
-
-    @property
-    def done(self) -> bool:
-        """Never: a recorder records until it is stopped."""
-        return False
 
     def close(self) -> None:
         """Take what is still in the queues, write it all and close the bag."""

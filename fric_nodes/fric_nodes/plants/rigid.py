@@ -31,40 +31,45 @@ from ..plant import Plant
 __all__ = ["PLANT"]
 
 @kernel
-def residual(
+def opposing(
     p: Any, z: Any, z_next: Any,
-    q: float, v_0: float, v_1: float, u: float, h: float, s: float, t: float, load: float, temperature: float,
+    q: float, w: float, h: float, s: float, t: float, load: float, temperature: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Residual of the midpoint equation [F] and the contact's mean friction force [F] for a trial ``v_1``."""
-    w = 0.5 * (v_0 + v_1)
+    """Force of the terms and mean friction force of the contact [F] over ``h`` at the mean velocity ``w``."""
     direction = s
     if not RIGID and w != 0.0:
         direction = 1.0 if w > 0.0 else -1.0
     c = Context(q + 0.5 * w * h, w, direction, t, load, temperature)
     friction = s * level(c, p) if RIGID else slip(z, z_next, w, h, level(c, p), p)
-    return p[0] * (v_1 - v_0) / h - u + force(c, p) + friction, friction
+    return force(c, p), friction
 
 
 @kernel
 def solve(
     p: Any, z: Any, z_next: Any,
-    q: float, v_0: float, u: float, h: float, s: float, t: float, load: float, temperature: float,
+    q: float, v: float, u: float, h: float, s: float, t: float, load: float, temperature: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Velocity after the step and mean friction force, for sliding in direction ``s`` throughout."""
-    a = v_0
-    r_a, friction = residual(p, z, z_next, q, v_0, a, u, h, s, t, load, temperature)
-    b = a - r_a * h / p[0]
-    scale = abs(u) + p[0] * (abs(v_0) + abs(b)) / h
-    for _ in range(60):
-        r_b, friction = residual(p, z, z_next, q, v_0, b, u, h, s, t, load, temperature)
-        if abs(r_b) <= 1e-13 * scale or r_b == r_a:
+    """Mean velocity over the step and mean friction force, for sliding in direction ``s`` throughout."""
+    half = h * (0.5 / p[0])
+    w_a = v
+    force_a, friction_a = opposing(p, z, z_next, q, w_a, h, s, t, load, temperature)
+    w_b = v + half * (u - force_a - friction_a)
+    friction_b = friction_a
+    for _ in range(50):
+        force_b, friction_b = opposing(p, z, z_next, q, w_b, h, s, t, load, temperature)
+        excess = w_b - v - half * (u - force_b - friction_b)
+        rise = w_b - w_a + half * (force_b - force_a + friction_b - friction_a)
+        if excess == 0.0 or rise == 0.0:
             break
-        step = -r_b * (b - a) / (r_b - r_a)
-        a, r_a = b, r_b
-        if a + step == a:
-            break
-        b = a + step
-    return b, friction
+        share = -excess / rise
+        move = share * (w_b - w_a)
+        near = abs(move) <= 5e-3 * abs(w_b - v) if RIGID else abs(move) <= 1e-6 * (abs(v) + abs(w_b))
+        if near:
+            # The secant's line serves for what is left: it closes the balance of forces with the friction force that is reported.
+            return w_b + move, friction_b + share * (friction_b - friction_a)
+        w_a, force_a, friction_a = w_b, force_b, friction_b
+        w_b += move
+    return w_b, friction_b
 
 
 @kernel
@@ -75,26 +80,26 @@ def step(
     q, v = x[0], x[1]
     if not RIGID:
         s = 1.0 if v >= 0.0 else -1.0
-        v_1, friction = solve(p, z, z_next, q, v, u, h, s, t, load, temperature)
-        x_next[0] = q + 0.5 * h * (v + v_1)
-        x_next[1] = v_1
+        w, friction = solve(p, z, z_next, q, v, u, h, s, t, load, temperature)
+        x_next[0] = q + h * w
+        x_next[1] = 2.0 * w - v
         return friction
     left = h
     impulse = 0.0
-    push = 0.0
     for _ in range(8):  # stops and starts within one step; more only when the step is far too long
+        push = 0.0
         if v == 0.0:
-            rest = Context(q, 0.0, 1.0, t, load, temperature)
-            push = u - force(rest, p)
+            push = u - force(Context(q, 0.0, 1.0, t, load, temperature), p)
             s = 1.0 if push > 0.0 else -1.0
             if abs(push) <= level(Context(q, 0.0, s, t, load, temperature), p):
                 impulse += push * left
                 break
         else:
             s = 1.0 if v > 0.0 else -1.0
-        v_1, friction = solve(p, z, z_next, q, v, u, left, s, t, load, temperature)
+        w, friction = solve(p, z, z_next, q, v, u, left, s, t, load, temperature)
+        v_1 = 2.0 * w - v
         if v_1 * s >= 0.0:
-            q += 0.5 * left * (v + v_1)
+            q += left * w
             v = v_1
             impulse += friction * left
             break
@@ -107,7 +112,7 @@ def step(
         friction = s * level(c, p)
         stop = p[0] * v / (force(c, p) + friction - u)
         stop = min(max(stop, 0.0), left)
-        q += 0.5 * stop * v
+        q += w * stop
         impulse += friction * stop
         v = 0.0
         left -= stop
@@ -135,6 +140,6 @@ PLANT = Plant(
     source="Newton; implicit midpoint rule with exact stops, derived in the module",
     parameters=(Parameter("mass", "m", "F s^2/x", "moving mass, or moment of inertia of a rotary axis", positive=True, linear=True),),
     states=("position", "velocity"),
-    functions=(residual, solve, step, drive),
+    functions=(opposing, solve, step, drive),
     inertia=_inertia,
 )
