@@ -1,8 +1,8 @@
-"""The axis as a controller sees it: a model moved by a drive of limited force, seen through an encoder and a noisy force signal.
+"""The axis as a controller sees it: a model moved by a drive of limited force, seen through an encoder and a force signal.
 
 The force is held between commands; the position is the encoder's, a whole number of its steps; the velocity is the difference
-quotient of encoder positions that a drive would report; the effort is the mean force that really acted since the last measurement,
-with the noise of a current measurement on it.
+quotient of encoder positions that a drive would report; the effort is the mean force that really acted since the last
+measurement, with the noise of a current measurement on it.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ from .plant import Plant
 __all__ = ["Loops", "loops_for"]
 
 
-_LOOPS = (loops.simulate, loops.predict)
+_LOOPS = (loops.simulate, loops.predict, loops.observe)
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,13 @@ class Loops:
     Attributes:
         simulate: motion from force.
         predict: force from motion.
+        observe: one-step prediction along measured positions.
         n_friction_states: number of states of the slip dynamics.
     """
 
     simulate: Callable[..., None]
     predict: Callable[..., None]
+    observe: Callable[..., None]
     n_friction_states: int
 
 
@@ -66,17 +68,30 @@ def _loops_for(plant: Plant, effects: tuple[Effect, ...]) -> Loops:
     source = _source(plant, effects)
     module = _import(source, _fingerprint(effects, source))
     n_states = sum(effect.n_states for effect in effects)
-    return Loops(module.simulate, module.predict, n_states)
+    sizes = len(plant.states), 2 * n_states
+    return Loops(
+        _with_work_space(module.simulate, sizes),
+        _with_work_space(module.predict, sizes),
+        _with_work_space(module.observe, sizes),
+        n_states,
+    )
+
+
+def _with_work_space(loop: Callable[..., None], sizes: tuple[int, int]) -> Callable[..., None]:
+    """``loop`` with its last arguments, ``x_next`` and ``z_next``, taken care of; new ones for each call, so that threads don't meet."""
+
+    def call(*arguments: object) -> None:
+        loop(*arguments, np.empty(sizes[0]), np.empty(sizes[1]))
+
+    return call
 
 
 def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
     """Text of the module that binds the structure's functions together."""
     imports = [
         "from typing import Any",
-        "import numpy as np",
-        "from numba import njit",
         "from fric_nodes.effect import Context",
-        "from fric_nodes.kernel import kernel",
+        "from fric_nodes.kernel import kernel, loop",
     ]
     level, force, slip = ["    total = 0.0"], ["    total = 0.0"], ["    return 0.0"]
     at = len(plant.parameters)
@@ -112,7 +127,7 @@ def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
         "@kernel\ndef slip(z, z_next, v, h, level, p):",
         *slip,
         *(inspect.getsource(_plain(function)) for function in plant.functions),
-        *("@njit(cache=True, nogil=True, error_model='numpy')\n" + inspect.getsource(loop) for loop in _LOOPS),
+        *("@loop\n" + inspect.getsource(function) for function in _LOOPS),
     ]
     return "\n".join(lines)
 

@@ -1,8 +1,8 @@
 """What an excitation is: a planned motion, known for all times in advance.
 
-An excitation lives in a file of its own in ``excitation/`` and offers a constant ``EXCITATION``: its parameters, declared as everywhere,
-and a function that plans the motion for their values. The plan gives position, velocity and acceleration in closed form, so
-that a node may ask for any sample, in any order, and gets the same bits.
+An excitation lives in a file of its own in ``excitation/`` and offers a constant ``EXCITATION``: its parameters, declared as
+everywhere, and a function that plans the motion for their values. The plan gives position, velocity and acceleration in
+closed form, so that a node may ask for any sample, in any order, and gets the same bits.
 """
 
 from __future__ import annotations

@@ -1,23 +1,22 @@
-"""The two compiled loops of every model: motion from force, and force from motion.
+"""The compiled loops of every model: motion from force, force from motion, and motion followed sample by sample.
 
 They are written once, over the names of :mod:`fric_nodes.assembled`, and compiled for each structure by
-:mod:`fric_nodes.compile`.
+:mod:`fric_nodes.compile`, which also hands in ``x_next`` and ``z_next``, the work space of a step.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from .assembled import RIGID, drive, force, level_sum, slip, step, unpacked
 from .effect import Context
 
-__all__ = ["predict", "simulate"]
+__all__ = ["observe", "predict", "simulate"]
 
 
 def simulate(
     p: Any, u: Any, h: float, n_sub: int, t_0: float, load: Any, temperature: Any, x: Any, z: Any, x_out: Any, friction_out: Any,
+    x_next: Any, z_next: Any,
 ) -> None:  # fmt: skip
     """Lead the states ``x`` and ``z``, in place, over ``len(u)`` intervals of length ``h`` [s] in ``n_sub`` steps each.
 
@@ -27,8 +26,6 @@ def simulate(
     """
     p = unpacked(p)
     h_sub = h / n_sub
-    x_next = np.empty_like(x)
-    z_next = np.empty_like(z)
     for k in range(u.shape[0]):
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
@@ -48,6 +45,7 @@ def simulate(
 
 def predict(
     p: Any, t: Any, q: Any, v: Any, a: Any, h: float, load: Any, temperature: Any, z: Any, u_out: Any, friction_out: Any,
+    x_next: Any, z_next: Any,
 ) -> None:  # fmt: skip
     """Force that the model needs for the motion ``q``, ``v``, ``a`` at each sample, all of shape ``(n_samples,)``.
 
@@ -55,7 +53,6 @@ def predict(
     force over the step belongs to the sample itself and no half step of delay creeps in. ``z`` is led on in place.
     """
     p = unpacked(p)
-    z_next = np.empty_like(z)
     for k in range(q.shape[0]):
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
@@ -69,3 +66,35 @@ def predict(
                 z[j] = z_next[j]
         friction_out[k] = friction
         u_out[k] = drive(p, q[k], v[k], a[k]) + force(c, p) + friction
+
+
+def observe(
+    p: Any, u: Any, y: Any, h: Any, n_sub: int, load: Any, temperature: Any,
+    alpha: float, beta: float, noise: float, x: Any, z: Any, innovation: Any,
+    x_next: Any, z_next: Any,
+) -> None:  # fmt: skip
+    """Follow the measured positions ``y``: predict each from the state before it, then correct position and velocity.
+
+    ``innovation[k]`` is ``y[k]`` minus its prediction [x], for ``len(u)`` intervals of lengths ``h`` [s]. The correction has the constant gains of an
+    alpha-beta filter. A contact that sticks exactly is left at rest while the innovation stays within three times ``noise`` [x]:
+    the noise of an encoder must not shake it loose.
+    """
+    p = unpacked(p)
+    t = 0.0
+    for k in range(u.shape[0]):
+        h_sub = h[k] / n_sub
+        load_k = load[k] if load.shape[0] > 1 else load[0]
+        temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
+        for m in range(n_sub):
+            step(p, x, x_next, z, z_next, u[k], h_sub, t + m * h_sub, load_k, temperature_k)
+            for j in range(x.shape[0]):
+                x[j] = x_next[j]
+            if not RIGID:
+                for j in range(z.shape[0]):
+                    z[j] = z_next[j]
+        e = y[k] - x[0]
+        innovation[k] = e
+        x[0] += alpha * e
+        if not (RIGID and x[1] == 0.0 and abs(e) <= 3.0 * noise):
+            x[1] += beta * e / h[k]
+        t += h[k]

@@ -16,7 +16,7 @@ from .record import Array
 
 __all__ = ["Motion", "Predictor", "Simulator", "intervals", "predict_force", "simulate"]
 
-_STEP_OF_RATE = 0.25  # largest product of step and fastest rate
+_STEP_OF_RATE = 0.04  # largest product of step and fastest rate; keeps forces to 1e-4 of their range
 _MAX_SUBSTEPS = 2000
 _NOMINAL_LOAD = np.array([1.0])
 _NOMINAL_TEMPERATURE = np.array([0.0])
@@ -53,9 +53,9 @@ def intervals(effort: Array, hold: str) -> Array:
     raise ValueError(f"hold is '{hold}', must be following, preceding or linear")
 
 
-def substeps(model: Model, sample_time: float) -> int:
-    """Steps per sample that the fastest rate of the model asks for."""
-    wanted = math.ceil(sample_time * model.max_rate() / _STEP_OF_RATE)
+def substeps(model: Model, sample_time: float, step_of_rate: float = _STEP_OF_RATE) -> int:
+    """Steps per sample that the fastest rate of the model asks for: their product with it stays below ``step_of_rate``."""
+    wanted = math.ceil(sample_time * model.max_rate() / step_of_rate)
     return min(max(wanted, 1), _MAX_SUBSTEPS)
 
 

@@ -29,54 +29,69 @@ def axis(
     return build_model("rigid", {"mass": mass}, terms)
 
 
-def radau(drive: object, t_end: float, step: float, stiffness: float, damping: float, mass: float, viscous: float) -> tuple[Array, ...]:
-    """Canudas de Wit et al. 1995, Eqs. 1 to 3 (g from Eq. 5), with the body they act on; the impulse of friction as a fourth state."""
+def radau(effort: Array, hold: float, step: float, stiffness: float, damping: float, mass: float) -> tuple[Array, Array]:
+    """Canudas de Wit et al. 1995, Eqs. 1 to 3 with g of Eq. 5, and the body they act on; force constant for ``hold`` seconds each.
 
-    def right_side(t: float, y: Array) -> list[float]:
+    Position at every ``step`` and the mean of friction over it, from its impulse as a fourth state.
+    """
+
+    def right_side(t: float, y: Array, u: float) -> Array:
         _, v, z, _ = y
         g = COULOMB + SURPLUS * np.exp(-((v / STRIBECK) ** 2))
         dz = v - stiffness * abs(v) / g * z
         friction = stiffness * z + damping * dz
-        return [v, (drive(t) - friction - viscous * v) / mass, dz, friction]  # type: ignore[operator]
+        return np.array([v, (u - friction - VISCOUS * v) / mass, dz, friction])
 
-    grid = step * np.arange(round(t_end / step) + 1)
-    scale = np.array([1e-3, 1e-2, 1e-5, 1e-2])
-    answer = solve_ivp(right_side, (0.0, grid[-1]), np.zeros(4), method="Radau", rtol=1e-10, atol=1e-10 * scale, t_eval=grid)
-    assert answer.success
-    return answer.y[0], answer.y[1], np.diff(answer.y[3]) / step
+    def jacobian(t: float, y: Array, u: float) -> Array:
+        _, v, z, _ = y
+        fall = SURPLUS * np.exp(-((v / STRIBECK) ** 2))
+        g, dg = COULOMB + fall, -2.0 * v / STRIBECK**2 * fall
+        dv = 1.0 - stiffness * np.sign(v) / g * z + stiffness * abs(v) * z / g**2 * dg
+        dz = -stiffness * abs(v) / g
+        f_v, f_z = damping * dv, stiffness + damping * dz
+        return np.array([[0, 1, 0, 0], [0, -(f_v + VISCOUS) / mass, -f_z / mass, 0], [0, dv, dz, 0], [0, f_v, f_z, 0]])
+
+    y = np.zeros(4)
+    rows = [y]
+    grid = step * np.arange(1, round(hold / step) + 1)
+    tolerance = 1e-10 * np.array([1e-3, 1e-2, 1e-5, 1e-2])
+    for u in effort:
+        answer = solve_ivp(
+            right_side, (0.0, grid[-1]), y, method="Radau", rtol=1e-10, atol=tolerance, t_eval=grid, args=(u,), jac=jacobian
+        )
+        assert answer.success
+        rows += list(answer.y.T)
+        y = answer.y[:, -1]
+    states = np.array(rows)
+    return states[:, 0], np.diff(states[:, 3]) / step
+
+
+# Force constant for 10 ms each: through break-away, sliding and two reversals.
+EFFORT = 12.0 * np.sin(2 * np.pi * 1.3 * (0.01 * np.arange(60) + 0.005))
 
 
 @pytest.mark.parametrize(
     ("stiffness", "damping", "mass"),
-    [(1e5, 100.0, 1.2), (1e5, 0.0, 1.2), (1e6, 800.0, 2.0), (1e5, 316.0, 0.3)],
+    [(1e5, 100.0, 1.2), (1e6, 800.0, 2.0), (1e5, 316.0, 0.3), (1e4, 30.0, 1.2)],
 )
 def test_force_and_motion_at_1_khz_match_an_implicit_integration(stiffness: float, damping: float, mass: float) -> None:
-    def drive(t: float) -> float:
-        return float(12.0 * np.sin(2 * np.pi * 0.7 * t))
-
-    model = axis(stiffness, damping, mass)
-    t = 1e-3 * np.arange(1500)
-    effort = 12.0 * np.sin(2 * np.pi * 0.7 * (t + 0.5e-3))
-    q, _, expected = radau(drive, 1.5, 1e-3, stiffness, damping, mass, VISCOUS)
-    states, friction = Simulator(model).run(effort, 1e-3)
+    q, expected = radau(EFFORT, 0.01, 1e-3, stiffness, damping, mass)
+    states, friction = Simulator(axis(stiffness, damping, mass)).run(np.repeat(EFFORT, 10), 1e-3)
     force_error = np.max(np.abs(friction - expected)) / np.ptp(expected)
     assert force_error < 1e-4, force_error
-    assert np.max(np.abs(states[:, 0] - q[1:])) < 1e-4 * np.ptp(q)
+    assert np.max(np.abs(states[:, 0] - q[1:])) < 1e-5 * np.ptp(q)
 
 
-def test_the_error_falls_with_the_square_of_the_step() -> None:
-    def drive(t: float) -> float:
-        return float(9.0 * np.sin(2 * np.pi * 2.0 * t))
-
-    q, _, _ = radau(drive, 0.6, 1e-3, 1e5, 100.0, 1.2, VISCOUS)
-    errors = []
-    for refine in (2, 4, 8):
-        step = 1e-3 / refine
-        effort = 9.0 * np.sin(2 * np.pi * 2.0 * step * (np.arange(600 * refine) + 0.5))
-        states, _ = Simulator(axis()).run(effort, step, 1)
-        errors.append(float(np.max(np.abs(states[refine - 1 :: refine, 0] - q[1:]))))
-    assert errors[0] / errors[1] > 3.0, errors
-    assert errors[1] / errors[2] > 3.0, errors
+def test_the_error_falls_with_the_square_of_the_step_through_reversals() -> None:
+    q, expected = radau(EFFORT, 0.01, 1e-3, 1e5, 100.0, 1.2)
+    position, force = [], []
+    for n_substeps in (4, 8, 16):
+        states, friction = Simulator(axis()).run(np.repeat(EFFORT, 10), 1e-3, n_substeps)
+        position.append(float(np.max(np.abs(states[:, 0] - q[1:]))))
+        force.append(float(np.max(np.abs(friction - expected))))
+    for errors in (position, force):
+        assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15), errors
+        assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.15), errors
 
 
 def test_break_away_under_a_slow_ramp_takes_coulomb_and_stribeck_force_together() -> None:
@@ -107,7 +122,7 @@ def test_steady_sliding_gives_the_slip_level_of_the_other_terms(direction: float
 def test_a_small_force_bends_the_bristles_by_force_over_stiffness(direction: float) -> None:
     push = direction * 6e-3  # a thousandth of break-away: dz/dt = v (1 - z/z_max) bends off by half of that
     motion = simulate(axis(damping=300.0), np.full(3000, push), 1e-3)
-    assert motion.position[-1] == pytest.approx(push / 1e5, rel=1e-3)
+    assert motion.position[-1] == pytest.approx(push / 1e5, rel=2e-3)
     assert motion.friction[-1] == pytest.approx(push, rel=1e-6)
 
 
@@ -155,11 +170,16 @@ def test_the_balance_of_momentum_closes_and_the_predictor_agrees() -> None:
     q, v = np.r_[0.0, states[:, 0]], np.r_[0.0, states[:, 1]]
     mean = 0.5 * (v[1:] + v[:-1])
     scale = np.max(np.abs(effort))
-    np.testing.assert_allclose(1.2 * np.diff(v) / 5e-4 + friction + VISCOUS * mean + 0.7, effort, atol=1e-9 * scale)
-    np.testing.assert_allclose(np.diff(q), 5e-4 * mean, atol=1e-15)
+    # A step in which it turns is two steps, whose mean velocity is not that of its ends.
+    on = v[1:] * v[:-1] > 0
+    assert np.mean(on) > 0.99
+    needed = 1.2 * np.diff(v) / 5e-4 + friction + VISCOUS * mean + 0.7
+    np.testing.assert_allclose(needed[on], effort[on], atol=1e-9 * scale)
+    np.testing.assert_allclose(np.diff(q)[on], 5e-4 * mean[on], atol=1e-15)
     wanted, _ = Predictor(model).run(t, 0.5 * (q[1:] + q[:-1]), mean, np.diff(v) / 5e-4, 5e-4)
-    # Near rest the bristles turn an error of velocity into force: what is left there is rounding times stiffness.
-    np.testing.assert_allclose(wanted, effort, atol=1e-6 * scale)
+    # The predictor takes each sample's velocity as constant; where the axis turns within one, it can't know the instant.
+    np.testing.assert_allclose(wanted[on], effort[on], atol=2e-3 * scale)
+    assert np.sqrt(np.mean((wanted - effort)[on] ** 2)) < 2e-4 * scale
 
 
 def test_friction_takes_energy_out_of_a_closed_cycle() -> None:
@@ -188,5 +208,5 @@ def test_sample_by_sample_is_one_run_to_the_last_bit() -> None:
 def test_the_step_follows_the_natural_frequency() -> None:
     for stiffness, mass in ((1e4, 1.2), (1e5, 1.2), (1e7, 1.2), (1e7, 0.1)):
         n = substeps(axis(stiffness=stiffness, mass=mass), 1e-3)
-        assert 1e-3 / n * np.sqrt(stiffness / mass) <= 0.25 * (1 + 1e-12)
+        assert 1e-3 / n * np.sqrt(stiffness / mass) <= 0.04 * (1 + 1e-12)
     assert substeps(axis(stiffness=10.0), 1e-3) == 1

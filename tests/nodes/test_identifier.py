@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from fric_nodes.bagio import BagWriter, write_record
-from fric_nodes.model import build_model, term
+from fric_nodes.identification import METHODS
+from fric_nodes.identification.result import Options
 from fric_nodes.model_file import read_model
 from fric_nodes.nodes.convert import model_from_message
+from fric_nodes.nodes.estimates import start_model
 from fric_nodes.nodes.identifier import IdentifierNode
-from fric_nodes.record import Record
-from fric_nodes.simulate import simulate
+from fric_nodes.record import Record, Units
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
@@ -22,7 +23,8 @@ from sensor_msgs.msg import JointState
 from fric_interfaces.msg import FrictionEstimate, FrictionModel, StampedForce
 from fric_interfaces.srv import FreezeIdentification, ResetIdentification, SaveIdentification, StartIdentification
 
-TRUTH = {"mass": 2.0, "coulomb.force": 6.0, "viscous.coefficient": 40.0, "bias.force": 0.8}
+# A bias of 0.8 N would be known to 2 % only after 20 s, which is no basis for a limit of 3 %; 2 N is known to 1 %.
+TRUTH = {"mass": 2.0, "coulomb.force": 6.0, "viscous.coefficient": 40.0, "bias.force": 2.0}
 RATE = 500
 
 
@@ -30,12 +32,19 @@ def recorded(seconds: float = 20.0) -> Record:
     """An axis of known friction under a force of several sines, with noise as a drive has it."""
     time = np.arange(int(seconds * RATE)) / RATE
     force = sum(a * np.sin(2 * np.pi * f * time + p) for a, f, p in ((14, 0.7, 0.0), (9, 1.9, 1.0), (7, 4.3, 2.0)))
-    model = build_model(
-        "rigid", {"mass": 2.0}, [term("coulomb", force=6.0), term("viscous", coefficient=40.0), term("bias", force=0.8)]
-    )
-    motion = simulate(model, force, 1 / RATE, hold="preceding", n_substeps=4)
+    position, x, v = np.zeros(time.size), 0.0, 0.0
+    step = 1 / RATE / 20
+    for k in range(1, time.size):
+        for _ in range(20):
+            v_next = v + step * (force[k] - 6.0 * np.sign(v) - 40.0 * v - 2.0) / 2.0
+            # At a reversal the axis stays unless the drive overcomes 6 N; within a step of 0.1 ms that is exact enough.
+            if v * v_next < 0.0 and abs(force[k] - 2.0) < 6.0:
+                v_next = 0.0
+            v = v_next if v != 0.0 or abs(force[k] - 2.0) > 6.0 else 0.0
+            x += step * v
+        position[k] = x
     noise = np.random.default_rng(7)
-    position = np.round(motion.position / 1e-7) * 1e-7
+    position = np.round(position / 1e-7) * 1e-7
     return Record(time, position, force + noise.normal(0.0, 0.1, time.size), effort_hold="preceding")
 
 
@@ -87,6 +96,9 @@ def test_from_a_recording_as_from_the_machine(graph: Any, tmp_path: Path) -> Non
     assert graph.finish(process, signal.SIGINT)[0] == 0
     last = listener.estimates[-1]
     assert values(last) == pytest.approx(TRUTH, rel=0.03)
+    structure = start_model(["coulomb", "viscous", "bias"], "axis", Units())
+    offline = METHODS["inverse-dynamics"].fit(structure, [recorded()], Options()).model
+    assert values(last) == pytest.approx(dict(zip(offline.names, offline.values, strict=True)), rel=0.03)
     assert last.samples_used > 5000
     assert last.state == FrictionEstimate.STATE_RUNNING
     assert list(last.units) == ["kg", "N", "N s/m", "N"]
@@ -148,7 +160,7 @@ def test_services(graph: Any, tmp_path: Path) -> None:
     assert (saved.success, saved.path) == (True, str(file))
     model = read_model(file)
     assert model.value("mass") == pytest.approx(2.0, rel=0.1)
-    assert not listener.call(SaveIdentification, "save", path=str(tmp_path / "no" / "such" / "folder" / "m.yaml")).success
+    assert not listener.call(SaveIdentification, "save", path=str(file / "not_in_a_file.yaml")).success
 
     assert listener.call(ResetIdentification, "reset").success
     graph.until(lambda: listener.estimates[-1].samples_used == 0, "a fresh start")

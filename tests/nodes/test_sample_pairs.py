@@ -15,9 +15,10 @@ def feed(pairing: EffortPairing, efforts: list[float], before: int = 10**9) -> l
 
 
 def test_the_effort_of_the_joint_state_by_its_meaning() -> None:
-    assert feed(EffortPairing("following"), [1.0, 2.0, 3.0]) == [(0, 1.0), (10, 2.0), (20, 3.0)]
-    assert feed(EffortPairing("preceding"), [1.0, 2.0, 3.0]) == [(0, 2.0), (10, 3.0)]
-    assert feed(EffortPairing("linear"), [1.0, 2.0, 4.0]) == [(0, 1.5), (10, 3.0)]
+    # At 10, the intervals beside the stamp carry the efforts of the samples 0 and 10, or of 10 and 20.
+    assert feed(EffortPairing("following"), [1.0, 2.0, 4.0]) == [(10, 1.5), (20, 3.0)]
+    assert feed(EffortPairing("preceding"), [1.0, 2.0, 4.0]) == [(0, 1.5), (10, 3.0)]
+    assert feed(EffortPairing("linear"), [1.0, 2.0, 4.0]) == [(0, 1.0), (10, 2.0), (20, 4.0)]
 
 
 def test_position_stays_with_its_stamp() -> None:
@@ -41,19 +42,20 @@ def test_after_a_restart_no_effort_is_carried_across() -> None:
     pairing = EffortPairing("preceding")
     for time, effort in ((50, 1.0), (60, 2.0), (0, 3.0), (10, 4.0)):
         pairing.state(Sample(time, time, 0.0, effort))
-    assert [(sample.time, sample.effort) for sample in pairing.ready(99)] == [(50, 2.0), (0, 4.0)]
+    assert [(sample.time, sample.effort) for sample in pairing.ready(99)] == [(50, 1.5), (0, 3.5)]
 
 
 def test_a_stamped_command_belongs_to_its_state_however_late_it_comes() -> None:
     pairing = EffortPairing("preceding")
     assert not pairing.lacks_effort
     pairing.command(7.0, received=3, stamp=0)
-    assert feed(pairing, [NOTHING, NOTHING, NOTHING]) == [(0, 7.0)]
+    pairing.command(8.0, received=4, stamp=10)
+    assert feed(pairing, [NOTHING] * 6) == [(10, 7.5)]
     assert pairing.lacks_effort
-    pairing.command(9.0, received=900, stamp=20)
-    # The command for stamp 10 was lost: that sample is left out, since a later one has been answered.
-    pairing.command(10.0, received=901, stamp=30)
-    assert [(sample.time, sample.effort) for sample in pairing.ready(999)] == [(20, 9.0)]
+    # The command for stamp 20 was lost: neither that sample nor the next has both neighbours.
+    for stamp, force in ((30, 9.0), (40, 10.0)):
+        pairing.command(force, received=900, stamp=stamp)
+    assert [(sample.time, sample.effort) for sample in pairing.ready(999)] == [(40, 9.5)]
 
 
 def test_an_unstamped_command_is_held_until_the_next() -> None:
@@ -61,5 +63,5 @@ def test_an_unstamped_command_is_held_until_the_next() -> None:
     for received, force in ((5, 1.0), (15, 2.0), (18, 3.0)):
         pairing.command(force, received, None)
     # Before the first command nothing is known; commands received after 25 may be missing yet.
-    assert feed(pairing, [NOTHING] * 4, before=25) == [(10, 1.0), (20, 3.0)]
+    assert feed(pairing, [NOTHING] * 4, before=25) == [(20, 2.0)]
     assert [(sample.time, sample.effort) for sample in pairing.ready(31)] == [(30, 3.0)]

@@ -1,13 +1,15 @@
 """Feedforward of the force that a model needs along the reference, with changes that don't jump.
 
 The force is that of :class:`fric_nodes.simulate.Predictor`: inertia, velocity-dependent friction and the state of the slip
-dynamics, on the *reference* motion, so that no measurement noise and no delay enters. A command given for sample k acts over the
-interval that follows, hence the force is wanted for a moment ``preview`` later: the reference is extrapolated with its velocity,
-its acceleration, and the difference of its accelerations. Half a sample is right for a force that is held over one sample.
+dynamics, on the *reference* motion, so that no measurement noise and no delay enters. A command given for sample k acts over
+the interval that follows, hence the force is wanted for a moment ``preview`` later: the reference is extrapolated with its
+velocity, its acceleration, and the difference of its accelerations. Half a sample is right for a force that is held over one
+sample.
 
-A new model is mixed in over ``transition_time`` while the old one still runs: force = sum of w_i F_i with sum of w_i = 1. Switching on
-and off is a gain that ramps alike. A model without slip dynamics has no friction force of its own at zero velocity; there the last friction
-force is let down over ``rest_fade_time``, since a static friction force that is kept up at rest (or flips with rounding) hunts.
+A new model is mixed in over ``transition_time`` while the old one still runs: force = sum of w_i F_i with sum of w_i = 1.
+Switching on and off is a gain that ramps alike. A model without slip dynamics has no friction force of its own at zero
+velocity; there the last friction force is let down over ``rest_fade_time``, since a static friction force that is kept up at
+rest (or flips with rounding) hunts.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ class FeedforwardError(InputError):
 
 
 def prepare(model: Model) -> None:
-    """Compile what ``model`` needs, or fetch it from the cache, which may take seconds; afterwards a change to it takes none."""
+    """Compile what ``model`` needs, or fetch it from the cache, which may take seconds; a change to it then takes none."""
     Predictor(model).step(0.0, 0.0, 0.0, 0.0, 1e-3)
 
 

@@ -7,8 +7,8 @@ Equation, at sample k with the reference r, the measured position y and the feed
     D_k = (T_f D_(k-1) + k_d ((c r_k - y_k) - (c r_(k-1) - y_(k-1)))) / (T_f + h)
     u_k = clip(P_k + I_k + D_k + f_k)
 
-Anti-windup by back-calculation: what the limits took away, u_k - (P_k + I_k + D_k + f_k), is fed back into the integral with the
-time constant T_t, so that the integral follows the limit and the output leaves it as soon as the error calls for it. The
+Anti-windup by back-calculation: what the limits took away, u_k - (P_k + I_k + D_k + f_k), is fed back into the integral with
+the time constant T_t, so that the integral follows the limit and the output leaves it as soon as the error calls for it. The
 feedforward takes part in the limit. A change of gains moves the difference into the integral, so that the output doesn't jump.
 Source: Astrom and Hagglund 2006, Advanced PID Control, sections 3.2 to 3.5 and 13.4 (backward differences).
 """

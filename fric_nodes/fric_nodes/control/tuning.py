@@ -1,13 +1,14 @@
 """Gains of a PID position controller for a mass with viscous damping: the most integral action at a given sensitivity.
 
-Loop: m dv/dt = u - d v with the force held between samples, at a period h, the command arriving a time tau late (a fraction of a sample
-or several), and the controller of :mod:`fric_nodes.control.pid` as it computes. The plant is discretised exactly,
+Loop: m dv/dt = u - d v with the force held between samples, at a period h, the command arriving a time tau late (a fraction
+of a sample or several), and the controller of :mod:`fric_nodes.control.pid` as it computes. The plant is discretised exactly,
 
     x_(k+1) = Phi(h) x_k + Phi(h - f) Gamma(f) u_(k-n-1) + Gamma(h - f) u_(k-n),     tau = n h + f,  0 <= f < h,
 
 so that the held sample (half a period of delay on average) is part of it. The gains are those with the largest k_i for which
-|S| = |1/(1 + L)| <= M_s and |T| = |L/(1 + L)| <= M_t at all frequencies up to Nyquist and the closed loop is stable. The largest k_i means the
-least integrated error after a step of load (integral of e = step / k_i), which is what friction does at a reversal.
+|S| = |1/(1 + L)| <= M_s and |T| = |L/(1 + L)| <= M_t at all frequencies up to Nyquist and the closed loop is stable. The
+largest k_i means the least integrated error after a step of load (integral of e = step / k_i), which is what friction does at
+a reversal.
 Source: Astrom, Panagopoulos, Hagglund 1998, and Astrom and Hagglund 2006, section 6.4 (MIGO); the search over the other two
 gains is this module's own. The delayed discretisation follows Astrom and Wittenmark 1997, section 2.3.
 """
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,12 +64,13 @@ class LoopMargins:
 class _Loop:
     """The open loop without its gains: one plant, one period, one delay, on one grid of frequencies."""
 
-    def __init__(self, mass: float, damping: float, period: float, delay: float, filter_time: float, points: int) -> None:
+    def __init__(self, mass: float, damping: float, period: float, delay: float, filter_time: float, decades: int) -> None:
         self.period = period
-        self.omega = np.geomspace(1e-4, 1.0, points) * math.pi / period
+        self.omega: Array = np.geomspace(10.0**-decades, 1.0, 100 * decades**2, dtype=np.float64) * math.pi / period
         z = np.exp(1j * self.omega * period)
         self._numerator, self._denominator = _plant(mass, damping, period, delay)
-        self.plant: Complex = np.polyval(self._numerator, z) / np.polyval(self._denominator, z)
+        plant = np.polyval(self._numerator.astype(complex), z) / np.polyval(self._denominator.astype(complex), z)
+        self.plant: Complex = np.asarray(plant, dtype=np.complex128)
         self.integral: Complex = period * z / (z - 1.0)
         self.derivative: Complex = (z - 1.0) / ((filter_time + period) * z - filter_time)
         self._filter_time = filter_time
@@ -79,7 +82,7 @@ class _Loop:
     def stable(self, kp: float, ki: float, kd: float) -> bool:
         """True when all closed-loop poles lie inside the unit circle."""
         h, t = self.period, self._filter_time
-        integrator, lag = np.array([1.0, -1.0]), np.array([t + h, -t])
+        integrator, lag = _coefficients(1.0, -1.0), _coefficients(t + h, -t)
         controller = kp * np.polymul(integrator, lag)
         controller = np.polyadd(controller, ki * h * np.polymul([1.0, 0.0], lag))
         controller = np.polyadd(controller, kd * np.polymul(integrator, integrator))
@@ -96,6 +99,11 @@ class _Loop:
         return float(sensitivity.max()), float((np.abs(ratio) * sensitivity).max())
 
 
+def _coefficients(*values: float) -> Any:
+    """A polynomial in z, highest power first."""
+    return np.array(values)
+
+
 def _plant(mass: float, damping: float, period: float, delay: float) -> tuple[Array, Array]:
     """Numerator and denominator in z of the held, delayed plant, force to position."""
     n, f = divmod(delay, period)
@@ -109,7 +117,7 @@ def _plant(mass: float, damping: float, period: float, delay: float) -> tuple[Ar
 
     def effect(t: float) -> Array:
         a = damping / mass * t
-        if a < 1e-4:  # noqa: PLR2004 - series, where the closed form cancels
+        if a < 1e-4:  # series, where the closed form cancels
             return np.array([t * t / mass * (0.5 - a / 6.0 + a * a / 24.0), t / mass * (1.0 - a / 2.0 + a * a / 6.0)])
         fall = -math.expm1(-a)
         return np.array([(t - fall * mass / damping) / damping, fall / damping])
@@ -156,7 +164,7 @@ def tune(
             raise TuningError("tuning", f"{name} is {value:g}", "give a number greater than 0")
     if min(damping, delay, filter_time) < 0.0:
         raise TuningError("tuning", "damping, delay or filter_time is negative", "give numbers of at least 0")
-    loop = _Loop(mass, damping, period, delay, filter_time, 400)
+    loop = _Loop(mass, damping, period, delay, filter_time, 2)
 
     def most(kp: float, kd: float) -> float:
         """Largest k_i that keeps the limits with these two gains; negative when not even 0 does."""
@@ -184,10 +192,9 @@ def tune(
     start = max(grid, key=lambda x: most(*gains(x)))
     if most(*gains(start)) <= 0.0:
         raise TuningError("tuning", "no gains keep the loop within its limits", "allow a higher sensitivity")
-    found = minimize(
-        lambda x: -most(*gains(x)), start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-3, "maxfev": 200, "initial_simplex": [
-            start, start + [0.1, 0.0], start + [0.0, 0.1]]},
-    )  # fmt: skip
+    simplex = np.array([start, start + np.array([0.1, 0.0]), start + np.array([0.0, 0.1])])
+    options = {"xatol": 1e-4, "fatol": 1e-3, "maxfev": 200, "initial_simplex": simplex}
+    found = minimize(lambda x: -most(*gains(x)), start, method="Nelder-Mead", options=options)
     kp, kd = gains(found.x)
     result = PidGains(kp, most(kp, kd), kd, filter_time)
     return result, loop_margins(result, mass, damping, period, delay=delay)
@@ -195,7 +202,7 @@ def tune(
 
 def loop_margins(gains: PidGains, mass: float, damping: float, period: float, *, delay: float = 0.0) -> LoopMargins:
     """Margins of the loop with ``gains``; arguments as for :func:`tune`."""
-    loop = _Loop(mass, damping, period, delay, gains.filter_time, 20_000)
+    loop = _Loop(mass, damping, period, delay, gains.filter_time, 7)
     triple = (gains.proportional, gains.integral, gains.derivative)
     ratio = loop.ratio(*triple)
     size, phase = np.abs(ratio), np.unwrap(np.angle(ratio))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..control.pid import PidGains
@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..files import write_text
 from ..identification import METHODS
 from ..identification.result import Identification, Options
+from ..identification.scoring import score
 from ..identification.screen import screened
 from ..model import Model, build_model, term
 from ..model_file import read_model, write_model
@@ -70,7 +71,7 @@ def identify(bag: Path) -> Identification:
     from ..bagio.read import read_record
 
     record = screened(read_record(bag, repair=True))
-    return METHODS["inverse-dynamics"].fit(_structure(), [record], Options())
+    return METHODS["prediction-error"].fit(_structure(), [record], Options())
 
 
 def _nodes(settings: DemoSettings, gains: PidGains, motion: str, model: Path | None, bag: Path) -> list[NodeSetup]:
@@ -137,27 +138,26 @@ def run_demo(settings: DemoSettings, tell: Callable[[str], None]) -> DemoOutcome
     damping = truth.value("viscous.coefficient")
     delay = _DELAY_PERIODS[settings.clock] * period
     gains, margins = tune(truth.value("mass"), damping, period, delay=delay, filter_time=_FILTER_TIME)
-    tell("PID alone: the axis follows its reference, everything is recorded")
-    before, _ = _run(settings, gains, "excitation", None, "excitation")
-    tell(f"identifying the friction from {before.bag}")
-    result = identify(before.bag)
+    tell("exciting the axis under the PID alone, and recording it")
+    excitation, _ = _run(settings, gains, "excitation", None, "excitation")
+    tell(f"identifying its friction from {excitation.bag}, by prediction error")
+    result = identify(excitation.bag)
     model = settings.out / "model.yaml"
     write_model(result.model, model)
-    tell("PID with the identified model: the same motion again")
-    after, rate = _run(settings, gains, "excitation", model, "excitation_compensated")
-    tell("a motion that the identification has not seen, without and with the model")
-    unseen_before, _ = _run(settings, gains, "demo_motion", None, "contour")
-    unseen_after, _ = _run(settings, gains, "demo_motion", model, "contour_compensated")
+    tell("following a contour with the PID alone")
+    before, _ = _run(settings, gains, "demo_motion", None, "contour")
+    tell("following the same contour with the identified model fed forward")
+    after, rate = _run(settings, gains, "demo_motion", model, "contour_compensated")
+    result = replace(result, validation=score(result.model, [before.record], Options()))
     described, margins_described = _described(gains, margins)
     outcome = DemoOutcome(
         clock=settings.clock,
         period=period,
         truth=truth,
         result=result,
+        excitation=excitation,
         before=before,
         after=after,
-        unseen_before=unseen_before,
-        unseen_after=unseen_after,
         margins=margins_described,
         gains=described,
         commands=_commands(settings, gains, model),
@@ -174,5 +174,7 @@ def _commands(settings: DemoSettings, gains: PidGains, model: Path) -> list[str]
         rest = " ".join(node.command()[3:])
         lines.append(f"fric node {node.name} {rest}")
     terms = "coulomb,stribeck,asymmetry,viscous,bias,presliding"
-    lines.append(f"fric identify {settings.out / 'bags' / 'excitation'} --terms {terms} --out {settings.out / 'identified'}")
+    lines.append(
+        f"fric identify {settings.out / 'bags' / 'excitation'} --terms {terms} --method prediction-error --out {settings.out / 'identified'}"
+    )
     return lines

@@ -21,7 +21,7 @@ _FALLEN = 80.0  # exp(-80) = 2e-35
 
 @kernel
 def level(c: Context, base: float, force: float, velocity: float, exponent: float) -> float:
-    ratio = abs(c.velocity) / velocity
+    ratio = abs(c.velocity) * (1.0 / velocity)  # the division is the loop's, not the step's
     # The common exponents skip the general power, which costs more than the rest of a step together.
     if exponent == 2.0:
         fall = ratio * ratio
@@ -33,6 +33,14 @@ def level(c: Context, base: float, force: float, velocity: float, exponent: floa
     if fall > _FALLEN:
         return base
     return base + force * math.exp(-fall)
+
+
+def _rate(mass: float, force: float, velocity: float, exponent: float) -> float:
+    """Growth rate of a velocity while friction falls, force / (velocity mass), over 16 [1/s].
+
+    The fall is passed in a moment, so that its error, unlike that of an oscillation, doesn't add up.
+    """
+    return force / (16.0 * velocity * mass)
 
 
 EFFECT = Effect(
@@ -48,6 +56,7 @@ EFFECT = Effect(
         Parameter("exponent", "delta", "1", "shape of the fall", lower=0.1, upper=10.0, default=2.0, shape=True),
     ),
     level=level,
+    rate=_rate,
     regime="low speed, both directions: more force than at moderate speed",
     looks_like={
         "dwell_time": "repeat reversals with rests of graded length: only dwell time makes break-away depend on the rest"

@@ -1,7 +1,8 @@
-"""Chirp: one sine whose frequency rises exponentially, at an amplitude that keeps position, velocity and acceleration in their limits.
+"""Chirp: a sine of exponentially rising frequency, its amplitude such that position, velocity and acceleration keep limits.
 
-Equation: q(t) = A(f) sin(2 pi integral of f dt), f(t) = f_1 (f_2/f_1)^(t/T), A(f) the least of q_max, v_max/(2 pi f), a_max/(2 pi f)^2, rounded off where
-one limit takes over from another (harmonic mean of second powers), so that A has continuous derivatives.
+Equation: q(t) = A(f) sin(2 pi integral of f dt), f(t) = f_1 (f_2/f_1)^(t/T), A(f) the least of q_max, v_max/(2 pi f),
+a_max/(2 pi f)^2, rounded off where one limit takes over from another (harmonic mean of second powers), so that A has
+continuous derivatives.
 Source: exponential sweep, Farina 2000; the amplitude law is this module's own.
 """
 

@@ -1,7 +1,7 @@
 """Multisine: a sum of sines of the same size in velocity, with random phases, scaled to a peak position and a peak velocity.
 
-Equation: q(t) = w(t) g sum_k sin(2 pi f_k t + phi_k) / f_k, with lines f_k = k/T between the band's edges, w a window that fades in
-and out, and g such that neither limit is exceeded.
+Equation: q(t) = w(t) g sum_k sin(2 pi f_k t + phi_k) / f_k, with lines f_k = k/T between the band's edges, w a window that
+fades in and out, and g such that neither limit is exceeded.
 Source: Pintelon and Schoukens 2012, System Identification, section 2.3 (random phase multisines).
 """
 
@@ -44,7 +44,7 @@ def plan(values: Mapping[str, float], random: np.random.Generator) -> Trajectory
     lines = int(values["lines"])
     if number.size > lines:
         number = np.unique(np.round(np.geomspace(number[0], number[-1], lines)).astype(int))
-    omega = 2.0 * math.pi * number / duration
+    omega: Array = 2.0 * math.pi * number.astype(np.float64) / duration
     phase = random.uniform(0.0, 2.0 * math.pi, number.size)
     wave = _Lines(omega, phase, 1.0 / omega)
     motion = Windowed(wave, duration, values["ramp"])
@@ -65,7 +65,9 @@ EXCITATION = Excitation(
         Parameter("duration", "T", "s", "length", lower=0.1, upper=1e5, default=20.0),
         Parameter("frequency_low", "f_1", "1/s", "lower edge of the band", lower=1e-4, upper=1e4, default=0.1),
         Parameter("frequency_high", "f_2", "1/s", "upper edge of the band", lower=1e-4, upper=1e4, default=4.0),
-        Parameter("lines", "n", "1", "most sines to use, spread over the band in equal ratios", lower=1, upper=1000, default=30),
+        Parameter(
+            "lines", "n", "1", "most sines to use, spread over the band in equal ratios", lower=1, upper=1000, default=30
+        ),
         Parameter("amplitude", "q_max", "x", "largest position", default=0.05, positive=True, upper=1e4),
         Parameter("speed", "v_max", "x/s", "largest velocity", default=0.3, positive=True, upper=1e4),
         Parameter("ramp", "T_r", "s", "time to fade in, and out", lower=0.0, upper=1e4, default=1.0),

@@ -58,8 +58,8 @@ class Piecewise:
     def move(self, position: float, span: float) -> None:
         """From rest to rest at ``position`` [x] within ``span`` [s], with the least jerk.
 
-        q(s) = q_0 + (q_1 - q_0) (10 s^3 - 15 s^4 + 6 s^5) (Flash and Hogan 1985); the largest velocity is 1.875 (q_1 - q_0) / T, the largest
-        acceleration 5.7735 (q_1 - q_0) / T^2.
+        q(s) = q_0 + (q_1 - q_0) (10 s^3 - 15 s^4 + 6 s^5) (Flash and Hogan 1985); the largest velocity is 1.875 (q_1 - q_0) /
+        T, the largest acceleration 5.7735 (q_1 - q_0) / T^2.
         """
         way = position - self.position
         self._add(span, [self.position, 0.0, 0.0, 10.0 * way, -15.0 * way, 6.0 * way])
@@ -77,6 +77,6 @@ class Piecewise:
             position = position * s + c[:, k]
             if k >= 1:
                 velocity = velocity * s + k * c[:, k]
-            if k >= 2:  # noqa: PLR2004 - the second derivative starts at s^2
+            if k >= 2:
                 acceleration = acceleration * s + k * (k - 1) * c[:, k]
         return Points(position, velocity / span, acceleration / (span * span))

@@ -1,6 +1,7 @@
 """Point to point: moves of least jerk between random positions, with rests of varied length.
 
-Equation: q(s) = q_0 + (q_1 - q_0)(10 s^3 - 15 s^4 + 6 s^5) for each move, as fast as the limits on velocity and acceleration allow.
+Equation: q(s) = q_0 + (q_1 - q_0)(10 s^3 - 15 s^4 + 6 s^5) for each move, as fast as the limits on velocity and acceleration
+allow.
 Source: Flash and Hogan 1985, Eq. 3 (minimum-jerk motion).
 """
 

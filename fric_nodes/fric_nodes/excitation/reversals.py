@@ -1,9 +1,10 @@
 """Reversals: slow triangles with rounded corners, a few at each of several speeds.
 
-Equation: constant velocity +v and -v over a stroke, joined by velocity changes v(s) = v_0 + (v_1 - v_0)(3 s^2 - 2 s^3) of limited acceleration;
-speeds from the lowest to the highest in equal ratios, the same number of cycles at each; at low speed the stroke is shortened so
-that no half cycle takes longer than a given time.
-Source: stroke-wise friction measurement at constant velocities, as in Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 5.
+Equation: constant velocity +v and -v over a stroke, joined by velocity changes v(s) = v_0 + (v_1 - v_0)(3 s^2 - 2 s^3) of
+limited acceleration; speeds from the lowest to the highest in equal ratios, the same number of cycles at each; at low speed
+the stroke is shortened so that no half cycle takes longer than a given time.
+Source: stroke-wise friction measurement at constant velocities, as in Armstrong-Helouvry, Dupont, Canudas de Wit 1994,
+section 5.
 """
 
 from __future__ import annotations
@@ -55,9 +56,13 @@ EXCITATION = Excitation(
         Parameter("speeds", "n", "1", "number of speeds, in equal ratios", lower=1, upper=100, default=8),
         Parameter("cycles", "m", "1", "there and back at each speed", lower=1, upper=1000, default=2),
         Parameter("stroke", "s", "x", "length of a stroke", default=0.03, positive=True, upper=1e4),
-        Parameter("half_cycle", "T_h", "s", "a stroke takes no longer; shortened at low speed", default=0.6, positive=True, upper=1e4),
+        Parameter(
+            "half_cycle", "T_h", "s", "a stroke takes no longer; shortened at low speed", default=0.6, positive=True, upper=1e4
+        ),
         Parameter("acceleration", "a", "x/s^2", "largest acceleration at the corners", default=2.0, positive=True, upper=1e5),
-        Parameter("corner_time", "T_c", "s", "least time for a change from rest to speed", default=0.02, positive=True, upper=100.0),
+        Parameter(
+            "corner_time", "T_c", "s", "least time for a change from rest to speed", default=0.02, positive=True, upper=100.0
+        ),
         Parameter("rest", "T_0", "s", "rest after each speed", lower=0.0, upper=1e4, default=0.1),
     ),
     plan=plan,

@@ -1,6 +1,7 @@
 """Steps of speed: constant speeds one after another in one direction, up and down again, then the same in the other direction.
 
-Equation: constant velocities v_k, joined by v(s) = v_k + (v_(k+1) - v_k)(3 s^2 - 2 s^3) of limited acceleration; no reversal within a staircase.
+Equation: constant velocities v_k, joined by v(s) = v_k + (v_(k+1) - v_k)(3 s^2 - 2 s^3) of limited acceleration; no reversal
+within a staircase.
 Source: ladder of constant velocities, as in Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 5.
 """
 
@@ -47,7 +48,9 @@ EXCITATION = Excitation(
         Parameter("speed_high", "v_2", "x/s", "highest speed", default=0.1, positive=True, upper=1e4),
         Parameter("speeds", "n", "1", "number of speeds, in equal ratios", lower=2, upper=100, default=7),
         Parameter("hold", "T", "s", "time at each speed", default=0.4, positive=True, upper=1e4),
-        Parameter("acceleration", "a", "x/s^2", "largest acceleration between two speeds", default=2.0, positive=True, upper=1e5),
+        Parameter(
+            "acceleration", "a", "x/s^2", "largest acceleration between two speeds", default=2.0, positive=True, upper=1e5
+        ),
         Parameter("travel", "s", "x", "travel that there is", default=0.3, positive=True, upper=1e5),
         Parameter("rest", "T_0", "s", "rest after each staircase", lower=0.0, upper=1e4, default=0.3),
     ),

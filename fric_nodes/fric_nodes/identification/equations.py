@@ -18,7 +18,7 @@ from scipy import signal
 from ..record import Array, Mask, Record
 from .result import IdentificationError, Options
 
-__all__ = ["Equations", "Stretch", "equations"]
+__all__ = ["Equations", "Stretch", "equations", "surroundings"]
 
 _FILTER_ORDER = 4
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
@@ -181,8 +181,7 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
     before = np.concatenate([effort[:1], effort[:-1]])
     after = np.concatenate([effort[1:], effort[-1:]])
     neighbour = {"following": before, "preceding": after, "linear": effort}[record.effort_hold]
-    load = record.extra.get("normal_load")
-    temperature = record.extra.get("temperature")
+    load, temperature = surroundings(record)
     return Stretch(
         time=record.time[first:last],
         sample_time=sample_time,
@@ -193,8 +192,16 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
         effort=effort,
         force=0.5 * (effort + neighbour),
         hold=record.effort_hold,
-        load=np.ones(1) if load is None else np.ascontiguousarray(load[first:last]) / float(np.mean(load)),
-        temperature=np.zeros(1)
-        if temperature is None
-        else np.ascontiguousarray(temperature[first:last] - float(np.mean(temperature))),
+        load=load[first:last] if load.shape[0] > 1 else load,
+        temperature=temperature[first:last] if temperature.shape[0] > 1 else temperature,
+    )
+
+
+def surroundings(record: Record) -> tuple[Array, Array]:
+    """Normal load relative to its mean, and temperature less its mean [K]; one value each where not recorded, else ``(n,)``."""
+    load = record.extra.get("normal_load")
+    temperature = record.extra.get("temperature")
+    return (
+        np.ones(1) if load is None else np.ascontiguousarray(load) / float(np.mean(load)),
+        np.zeros(1) if temperature is None else np.ascontiguousarray(temperature) - float(np.mean(temperature)),
     )

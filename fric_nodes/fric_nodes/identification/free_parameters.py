@@ -73,6 +73,23 @@ class FreeParameters:
             tuple(name for name in self.names if name not in names),
         )
 
+    def within_reach(self, model: Model, equations: Equations) -> FreeParameters:
+        """The same with nonlinear parameters kept within ten times the range of their candidates.
+
+        Beyond that a recording can't tell one value from another (a Stribeck velocity far above every speed), and a solver that
+        wanders there doesn't come back.
+        """
+        declared = list(model.parameters())
+        level = float(np.median(np.abs(equations.force)))
+        lower, upper = self.lower.copy(), self.upper.copy()
+        for k in np.flatnonzero(~self.linear):
+            tried = candidates(declared[int(self.index[k])].declaration.dimension, equations, level)
+            value = declared[int(self.index[k])].value
+            if tried.size:
+                lower[k] = max(lower[k], min(0.1 * float(tried[0]), value))
+                upper[k] = min(upper[k], max(10.0 * float(tried[-1]), value))
+        return FreeParameters(self.index, self.linear, lower, upper, self.names)
+
     def at_bound(self, model: Model) -> Mask:
         """True for each free parameter whose value lies on a bound, shape ``(n_free,)``."""
         values = model.values[self.index]

@@ -158,6 +158,7 @@ def _refine(model: Model, found: Equations, free: FreeParameters, use: Mask, rob
         return found.force - predicted(model.with_values(values), found)
 
     weight = weights(residual(start[free.index] / scale), use, robust)
+    free = free.within_reach(model, found)
     point = np.clip(start[free.index], free.lower, free.upper) / scale
     for _ in range(5):
         root = np.sqrt(weight)

@@ -13,13 +13,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from ..model import Model
 from ..record import Array, Record
-from ..simulate import Predictor, Simulator, intervals
+from ..simulate import Predictor, Simulator, intervals, substeps
 from . import inverse_dynamics
 from .equations import Stretch
+from .gauss_newton import minimise
 from .result import Identification, Method, Options
 from .scoring import score
 from .statistics import sandwich_covariance
@@ -46,7 +46,12 @@ def _runs(stretches: Sequence[Stretch], horizon: float | None) -> list[_Run]:
     return [run for run in runs if run.last - run.first > 2]
 
 
-def _errors(model: Model, runs: Sequence[_Run]) -> Array:
+def _part(signal: Array, run: _Run) -> Array:
+    """The run's part of a signal with one value per interval, or the one value that it has."""
+    return signal[run.first : run.last - 1] if signal.shape[0] > 1 else signal
+
+
+def _errors(model: Model, runs: Sequence[_Run], n_substeps: int) -> Array:
     """Simulated minus measured position over all runs [x]."""
     errors = []
     leader: tuple[Stretch, Predictor] | None = None
@@ -57,10 +62,10 @@ def _errors(model: Model, runs: Sequence[_Run]) -> Array:
             if leader is None or leader[0] is not s:
                 leader = (s, Predictor(model))
             simulator.friction_state[:] = leader[1].friction_state
-            leader[1].run(
-                s.time[part][:-1], s.position[part][:-1], s.velocity[part][:-1], s.acceleration[part][:-1], s.sample_time
-            )
-        states, _ = simulator.run(intervals(s.effort[part], s.hold), s.sample_time)
+            led = (s.time, s.position, s.velocity, s.acceleration)
+            leader[1].run(*(_part(signal, run) for signal in led), s.sample_time, _part(s.load, run), _part(s.temperature, run))
+        effort = intervals(s.effort[part], s.hold)
+        states, _ = simulator.run(effort, s.sample_time, n_substeps, _part(s.load, run), _part(s.temperature, run))
         errors.append(states[:, 0] - s.raw_position[part][1:])
     return np.concatenate(errors)
 
@@ -79,33 +84,25 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     scale = np.abs(values[free.index])
     scale[scale == 0.0] = 1.0
 
+    # The same for every trial: a change from one number of sub-steps to the next would look like a slope.
+    n_substeps = max(substeps(start, stretch.sample_time) for stretch in found.stretches)
+
     def residual(scaled: Array) -> Array:
         trial = values.copy()
         trial[free.index] = scaled * scale
-        errors = _errors(start.with_values(trial), runs)
+        errors = _errors(start.with_values(trial), runs, n_substeps)
         # A run that escapes must cost much, not break the solver.
         return np.nan_to_num(errors, nan=1e6, posinf=1e6, neginf=-1e6)
 
-    answer = least_squares(
-        residual,
-        values[free.index] / scale,
-        bounds=(free.lower / scale, free.upper / scale),
-        x_scale="jac",
-        diff_step=1e-5,
-        xtol=1e-6,
-        ftol=1e-7,
-        max_nfev=100,
-    )
-    values[free.index] = np.asarray(answer.x) * scale
+    answer = minimise(residual, values[free.index] / scale, free.lower / scale, free.upper / scale)
+    values[free.index] = answer.point * scale
     starts = np.cumsum([0, *(run.last - run.first - 1 for run in runs)])[:-1]
-    jacobian = np.asarray(answer.jac) / scale
-    covariance = sandwich_covariance(jacobian, np.asarray(answer.fun), np.ones(answer.fun.shape[0]), starts)
+    jacobian = answer.jacobian / scale
+    covariance = sandwich_covariance(jacobian, answer.residual, np.ones(answer.residual.shape[0]), starts)
     model = start.with_values(values, inverse_dynamics.standard_errors(free, covariance))
     warnings, status = warnings_of(model, free, covariance)
-    if answer.status <= 0:
-        status = (
-            "not converged after 100 steps; start nearer to the machine's values (--model), or shorten the runs (--horizon)"
-        )
+    if not answer.converged:
+        status = f"not converged after {answer.iterations} steps; start nearer to the machine's values (--model), or shorten the runs (--horizon)"
     return Identification(
         model=model,
         fitted=free.names,

@@ -22,12 +22,14 @@ PERIOD = NodeParameter("period", 0.002, "sample period of the loop", "s", 1e-5, 
 LOCK_STEP = NodeParameter("lock_step", False, "count samples instead of time: the plant waits for the command to each sample")
 COMMON = (
     NodeParameter("joint", "axis", "name of the joint in joint states and models"),
-    NodeParameter("realtime_priority", 0, "wall time: SCHED_FIFO priority to ask the system for; 0: normal scheduling", "", 0, 99),
+    NodeParameter(
+        "realtime_priority", 0, "wall time: SCHED_FIFO priority to ask the system for; 0: normal scheduling", "", 0, 99
+    ),
     NodeParameter("diagnostics_period", 1.0, "time between two reports on /diagnostics", "s", 0.01, 3600.0),
 )
 
 
-class LoopNode(Node):  # type: ignore[misc]
+class LoopNode(Node):
     """A node with declared parameters that reports on itself.
 
     Args:
@@ -55,7 +57,9 @@ class LoopNode(Node):  # type: ignore[misc]
         self.deadlines = Deadlines(0.0 if self.lock_step else self.period)
         self.finished: Future = Future()
         self._scheduling = "normal"
-        self._reporter = Reporter(self, self.settings.number("diagnostics_period"), self.deadlines, self.counters, self._all_conditions)
+        self._reporter = Reporter(
+            self, self.settings.number("diagnostics_period"), self.deadlines, self.counters, self._all_conditions
+        )
 
     def settle(self) -> None:
         """Called once before the loop starts, by a process that the node has for itself."""
@@ -87,7 +91,7 @@ class LoopNode(Node):  # type: ignore[misc]
 
 
 def wall_clock() -> tuple[int, int]:
-    """Time since 1970 and monotonic time of the same instant [ns]: stamps are counted on from here, free of clock corrections."""
+    """Time since 1970 and monotonic time of one instant [ns]: stamps count on from here, free of clock corrections."""
     return time.time_ns(), time.monotonic_ns()
 
 

@@ -9,10 +9,11 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from fric_interfaces.msg import FrictionModel, Reference, StampedForce
-from fric_interfaces.srv import LoadModel
 from rclpy.task import Future
 from std_msgs.msg import Float64
+
+from fric_interfaces.msg import FrictionModel, Reference, StampedForce
+from fric_interfaces.srv import LoadModel
 
 from ..control.feedforward import Feedforward, prepare
 from ..errors import InputError
@@ -35,9 +36,9 @@ PARAMETERS = (
     NodeParameter("follow_topic", True, "take over models from friction/model", settable=True),
     NodeParameter("terms", [""], "effects of the model to compensate; empty: all"),
     NodeParameter("include_inertia", True, "feed the inertia force forward too", settable=True),
-    NodeParameter("preview", -1.0, "how much later than its stamp the force acts; negative: half a period in lock-step, one and "
-                  "a half in wall time", "s", -1.0, 10.0, settable=True),
-    NodeParameter("transition_time", 0.2, "time of a change from one model to another, and to switch on and off", "s", 0.0, 100.0),
+    NodeParameter("preview", -1.0, "how much later than its stamp the force acts; negative: by the clock", "s", -1.0, 10.0,
+                  settable=True),
+    NodeParameter("transition_time", 0.2, "time to change from a model to another, and to switch on and off", "s", 0.0, 100.0),
     NodeParameter("rest_fade_time", 0.1, "time in which a static friction force is let down at rest", "s", 0.0, 100.0),
     NodeParameter("stamped", False, "wall time: publish StampedForce instead of Float64; lock-step always does"),
 )  # fmt: skip
@@ -79,8 +80,9 @@ class CompensatorNode(LoopNode):
 
     def _preview(self) -> float:
         given = self.settings.number("preview")
-        # In wall time the command leaves half a period after the reference on average, and is held for another.
-        return given if given >= 0.0 else (0.5 if self.lock_step else 1.5) * self.period
+        # The middle of the interval in which the command acts. In wall time the reference is half a period old on average when
+        # a joint state meets it, and the messages take a while.
+        return given if given >= 0.0 else (0.5 if self.lock_step else 1.2) * self.period
 
     def _on_settings(self, _changed: set[str]) -> None:
         self._feedforward.enabled = self.settings.flag("enabled")
@@ -88,6 +90,7 @@ class CompensatorNode(LoopNode):
         self._feedforward.preview = self._preview()
 
     def condition(self) -> Mapping[str, str]:
+        """What the node adds to its report."""
         model = self._feedforward.model
         effects = "none" if model is None else ", ".join(model.prefixes)
         return {"model": effects, "enabled": str(self._feedforward.enabled)}
@@ -107,7 +110,7 @@ class CompensatorNode(LoopNode):
             try:
                 prepare(model)
                 self._ready.append((model, done))
-            except Exception as error:  # noqa: BLE001 - whatever it was, it belongs to who asked for the model
+            except Exception as error:
                 done.set_exception(error)
 
         threading.Thread(target=work, daemon=True).start()

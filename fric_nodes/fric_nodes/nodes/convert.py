@@ -6,8 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 from builtin_interfaces.msg import Time
-from fric_interfaces.msg import FrictionModel, FrictionParameter, FrictionTerm
 from sensor_msgs.msg import JointState
+
+from fric_interfaces.msg import FrictionModel, FrictionParameter, FrictionTerm
 
 from ..effects import by_name
 from ..model import Model, ModelError, Term, build_model
@@ -15,7 +16,16 @@ from ..parameter import Parameter
 from ..plants import PLANTS
 from ..record import Units
 
-__all__ = ["JointSample", "MessageError", "from_seconds", "joint_sample", "model_from_message", "model_to_message", "nanoseconds", "set_stamp"]
+__all__ = [
+    "JointSample",
+    "MessageError",
+    "from_seconds",
+    "joint_sample",
+    "model_from_message",
+    "model_to_message",
+    "nanoseconds",
+    "set_stamp",
+]
 
 _SECOND = 1_000_000_000
 
@@ -118,7 +128,9 @@ def model_from_message(message: FrictionModel) -> Model:
     for entry in message.terms:
         effect = by_name(entry.effect, entry.law)
         if effect is None:
-            raise ModelError("model message", f"unknown effect '{entry.effect}' '{entry.law}'", "use the effects of fric-model/1")
+            raise ModelError(
+                "model message", f"unknown effect '{entry.effect}' '{entry.law}'", "use the effects of fric-model/1"
+            )
         seen[effect.id] = seen.get(effect.id, 0) + 1
         prefix = effect.id if seen[effect.id] == 1 else f"{effect.id}#{seen[effect.id]}"
         terms.append(Term(effect, tuple(_values(effect.id, effect.parameters, entry, errors, f"{prefix}.").values())))

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from fric_interfaces.msg import Reference, StampedForce
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+
+from fric_interfaces.msg import Reference, StampedForce
 
 from ..excitation import EXCITATIONS
 from ..excitation.sequence import Sequence
@@ -28,12 +29,17 @@ PARAMETERS = (
     LOCK_STEP,
     NodeParameter("kinds", ["multisine"], "excitations to go through, in this order", choices=tuple(EXCITATIONS)),
     NodeParameter("seed", 0, "of what is random in them", "", 0, 2**31 - 1),
-    NodeParameter("start_delay", 0.5, "rest before the first", "s", 0.0, 1e6),
+    NodeParameter("wait_for_subscribers", 1, "wall time: start when so many nodes listen", "", 0, 100),
+    NodeParameter("start_delay", 1.0, "rest before the first", "s", 0.0, 1e6),
     NodeParameter("pause", 0.5, "rest after each", "s", 0.0, 1e6),
     NodeParameter("repeat", False, "go through them again and again"),
-    NodeParameter("output", "reference", "what is published; force: position is the force [N or N m]", choices=("reference", "force")),
+    NodeParameter(
+        "output", "reference", "what is published; force: position is the force [N or N m]", choices=("reference", "force")
+    ),
     NodeParameter("stamped", False, "wall time, output force: publish StampedForce instead of Float64; lock-step always does"),
-    NodeParameter("look_ahead", 16, "lock-step: samples sent ahead of the plant; makes no difference to the numbers", "", 0, 64),
+    NodeParameter(
+        "look_ahead", 16, "lock-step: samples sent ahead of the plant; makes no difference to the numbers", "", 0, 64
+    ),
     *(from_declaration(p, kind.id, Units()) for kind in EXCITATIONS.values() for p in kind.parameters),
 )
 
@@ -72,9 +78,11 @@ class ExcitationNode(LoopNode):
         else:
             self._epoch, self._origin = wall_clock()
             self._start: int | None = None
+            self._listeners = settings.integer("wait_for_subscribers")
             self.create_timer(self.period, self._tick)
 
     def condition(self) -> Mapping[str, str]:
+        """What the node adds to its report."""
         return {"planned duration [s]": f"{self._plan.duration:.3f}"}
 
     def _publish(self, stamp: int, position: float, velocity: float, acceleration: float) -> None:
@@ -110,7 +118,7 @@ class ExcitationNode(LoopNode):
     def _at(self, sample: int) -> list[float]:
         number, at = divmod(sample, _BLOCK)
         if self._block[0] != number:
-            times = np.arange(number * _BLOCK, (number + 1) * _BLOCK) * self.period
+            times = np.arange(number * _BLOCK, (number + 1) * _BLOCK, dtype=np.float64) * self.period
             self._block = (number, np.stack(self._plan.at(times), axis=1).tolist())
         return self._block[1][at]
 
@@ -119,8 +127,8 @@ class ExcitationNode(LoopNode):
     def _tick(self) -> None:
         now = time.monotonic_ns()
         if self._start is None:
-            # The motion starts when somebody is there to follow it.
-            if self._publisher.get_subscription_count() == 0:
+            # The motion starts when somebody is there to follow it, and not before.
+            if self._publisher.get_subscription_count() < self._listeners:
                 return
             self._start = now
         position, velocity, acceleration = self._plan.at(np.array([(now - self._start) * 1e-9]))

@@ -1,8 +1,8 @@
 """An executor for a sample-by-sample loop: it keeps its list of entities and calls subscriptions and timers directly.
 
-rclpy's SingleThreadedExecutor collects all entities anew for every wait and wraps every callback into a task, which costs in the
-order of 100 us for each message. Here the entities are collected when one was made or destroyed, a wait then only names their
-handles, and a message goes from the middleware straight to its callback: about a quarter of the time for a sample of the
+rclpy's SingleThreadedExecutor collects all entities anew for every wait and wraps every callback into a task, which costs in
+the order of 100 us for each message. Here the entities are collected when one was made or destroyed, a wait then only names
+their handles, and a message goes from the middleware straight to its callback: about a quarter of the time for a sample of the
 lock-step loop. Services, clients and event handlers, which are not in a hurry, are left to the parent class.
 """
 
@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
+from threading import RLock
 from typing import Any
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
@@ -28,6 +30,7 @@ class LeanExecutor(SingleThreadedExecutor):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self._held = ExitStack()
+        self._turning = RLock()
         self._wait_set: Any = None
         self._known: tuple[int, ...] = ()
         self._next_look = 0.0
@@ -49,15 +52,26 @@ class LeanExecutor(SingleThreadedExecutor):
         self._timers = [t for n in nodes for t in n.timers if self.can_execute(t)]
         self._services = [s for n in nodes for s in n.services]
         self._clients = [c for n in nodes for c in n.clients]
-        guards = [self._guard, self._sigint_gc, *(g for n in nodes for g in n.guards)]
-        self._guards = [guard for guard in guards if guard is not None]
-        for entity in (*self._subscriptions, *self._timers, *self._services, *self._clients, *self._guards):
-            self._held.enter_context(entity.handle)
-        self._held.enter_context(self._context.handle)
+        self._guards: list[Any] = [self._guard, self._sigint_gc, *(g for n in nodes for g in n.guards)]
+        # One that is being destroyed can't be held any more, and isn't waited on.
+        self._subscriptions = [s for s in self._subscriptions if self._hold(s)]
+        self._timers = [t for t in self._timers if self._hold(t)]
+        self._services = [s for s in self._services if self._hold(s)]
+        self._clients = [c for c in self._clients if self._hold(c)]
+        self._guards = [g for g in self._guards if self._hold(g)]
+        context: Any = self._context.handle
+        self._held.enter_context(context)
         self._wait_set = _rclpy.WaitSet(
             len(self._subscriptions), len(self._guards), len(self._timers), len(self._clients), len(self._services), 0,
-            self._context.handle,
+            context,
         )  # fmt: skip
+
+    def _hold(self, entity: Any) -> bool:
+        try:
+            self._held.enter_context(entity.handle)
+        except InvalidHandle:
+            return False
+        return True
 
     def _release(self) -> None:
         self._held.close()
@@ -85,7 +99,7 @@ class LeanExecutor(SingleThreadedExecutor):
         """Let the parent class do what is left, and notice new entities."""
         for _ in range(2 * (len(self._services) + len(self._clients)) + _EVENTS):
             try:
-                task, _entity, _node = self.wait_for_ready_callbacks(timeout_sec=0.0)
+                task = self.wait_for_ready_callbacks(timeout_sec=0.0)[0]
             except TimeoutException:
                 break
             task()
@@ -98,7 +112,9 @@ class LeanExecutor(SingleThreadedExecutor):
     def _spin_once_impl(self, timeout_sec: Any = None, *_: Any) -> None:
         """Wait for something to do, at most ``timeout_sec`` [s], and do all that is ready."""
         try:
-            self._turn(timeout_sec)
+            with self._turning:
+                if not self._is_shutdown:
+                    self._turn(timeout_sec)
         except _rclpy.RCLError:
             # A signal may end the context between any two calls; that is a shutdown and not a fault.
             if self._context.ok():
@@ -131,6 +147,8 @@ class LeanExecutor(SingleThreadedExecutor):
                     if taken is None:
                         break
                     callback(taken[0])
+        if self._is_shutdown:
+            return
         now = time.monotonic()
         if others or now >= self._next_look:
             self._next_look = now + _HOUSEKEEPING
@@ -138,5 +156,9 @@ class LeanExecutor(SingleThreadedExecutor):
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """Stop, and let go of the nodes' entities."""
-        self._release()
+        # Another thread may be waiting: it is woken first, and what it waits on is let go only when it has come back.
+        self._is_shutdown = True
+        self.wake()
+        with self._turning:
+            self._release()
         return bool(super().shutdown(timeout_sec))

@@ -5,7 +5,8 @@ answer that it gave before. So a lost message and a restarted node cost one repe
 follow from messages arriving in the order in which they were sent:
 
 - a stamp that was answered already is a repetition;
-- a message with an earlier stamp than the newest one means that its sender goes through the samples again from there, so that what
+- a message with an earlier stamp than the newest one means that its sender goes through the samples again from there, so that
+what
   it sent for that stamp and later ones no longer counts (:class:`Stream`).
 """
 

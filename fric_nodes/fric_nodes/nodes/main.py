@@ -46,5 +46,5 @@ def run(make: Callable[[], LoopNode], args: list[str] | None = None) -> None:
     finally:
         rclpy.try_shutdown()
     if refusal is not None:
-        print(refusal, file=sys.stderr)
+        sys.stderr.write(f"{refusal}\n")
         sys.exit(2)

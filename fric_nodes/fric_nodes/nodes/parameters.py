@@ -1,6 +1,7 @@
-"""ROS parameters from one declaration each: type, unit, documentation, range or choices, default, and whether it may be set later.
+"""ROS parameters from one declaration each: type, unit, documentation, range or choices, default, and if it may be set later.
 
-The declaration produces the ParameterDescriptor that ``ros2 param describe`` shows, and the check that every later change passes.
+The declaration produces the ParameterDescriptor that ``ros2 param describe`` shows, and the check that every later change
+passes.
 """
 
 from __future__ import annotations
@@ -22,7 +23,13 @@ from ..record import Units
 
 __all__ = ["NodeParameter", "NodeParameterError", "Settings", "from_declaration"]
 
-_TYPE_NAMES: Mapping[type, str] = {bool: "bool", int: "integer", float: "double (write a decimal point)", str: "string", list: "array"}
+_TYPE_NAMES: Mapping[type, str] = {
+    bool: "bool",
+    int: "integer",
+    float: "double (write a decimal point)",
+    str: "string",
+    list: "array",
+}
 
 
 class NodeParameterError(InputError):
@@ -63,7 +70,9 @@ class NodeParameter:
         if bounded and isinstance(self.default, float):
             # The range message knows no infinity, so an open side gets the largest number there is.
             most = sys.float_info.max
-            described.floating_point_range = [FloatingPointRange(from_value=max(self.lower, -most), to_value=min(self.upper, most))]
+            described.floating_point_range = [
+                FloatingPointRange(from_value=max(self.lower, -most), to_value=min(self.upper, most))
+            ]
         elif bounded and isinstance(self.default, int):
             most_int = 2**63 - 1
             lower, upper = max(self.lower, -most_int), min(self.upper, most_int)
@@ -95,8 +104,8 @@ def from_declaration(parameter: Parameter, prefix: str, units: Units, settable: 
     lower = max(parameter.lower, sys.float_info.min) if parameter.positive else parameter.lower
     unit = parameter.unit(units)
     return NodeParameter(
-        f"{prefix}.{parameter.name}", float(parameter.default), parameter.doc, "" if unit == "1" else unit, lower, parameter.upper,
-        settable=settable,
+        f"{prefix}.{parameter.name}", float(parameter.default), parameter.doc,
+        "" if unit == "1" else unit, lower, parameter.upper, settable=settable,
     )  # fmt: skip
 
 

@@ -11,9 +11,10 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from fric_interfaces.msg import Reference, StampedForce
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+
+from fric_interfaces.msg import Reference, StampedForce
 
 from ..control.pid import Pid, PidGains
 from .base import LOCK_STEP, PERIOD, LoopNode
@@ -39,7 +40,9 @@ PARAMETERS = (
     NodeParameter("force_limit", 1e6, "largest command", "N or N m", 0.0, _LONGEST, settable=True),
     NodeParameter("use_feedforward", True, "add the feedforward force; in lock-step false means not to wait for one"),
     NodeParameter("feedforward_timeout", 0.1, "wall time: leave out a feedforward that is older", "s", 1e-3, 1e6),
-    NodeParameter("reference_timeout", 0.1, "wall time: hold the last position when references stop for so long", "s", 1e-3, 1e6),
+    NodeParameter(
+        "reference_timeout", 0.1, "wall time: hold the last position when references stop for so long", "s", 1e-3, 1e6
+    ),
     NodeParameter("stamped", False, "wall time: use StampedForce instead of Float64; lock-step always does"),
 )
 
@@ -85,6 +88,7 @@ class PidNode(LoopNode):
         self._pid.limit = self.settings.number("force_limit")
 
     def condition(self) -> Mapping[str, str]:
+        """What the node adds to its report."""
         return {"saturated": str(self._pid.saturated)}
 
     def _on_reference(self, reference: Reference) -> None:

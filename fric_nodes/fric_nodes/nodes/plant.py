@@ -1,7 +1,8 @@
 """The machine to be controlled, simulated: takes ``force_command``, gives ``joint_states``.
 
 In wall time the axis moves by the time that really passes, and a command acts from the moment of its arrival; without a command
-for ``watchdog_time`` the drive gives no force. In lock-step it moves by one period when the command for the present sample has come.
+for ``watchdog_time`` the drive gives no force. In lock-step it moves by one period when the command for the present sample
+has come.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from fric_interfaces.msg import StampedForce
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+
+from fric_interfaces.msg import StampedForce
 
 from ..axis import SimulatedAxis
 from ..model_file import read_model
@@ -90,6 +92,7 @@ class PlantNode(LoopNode):
             self.create_timer(self.period, self._tick)
 
     def condition(self) -> Mapping[str, str]:
+        """What the node adds to its report."""
         return {"samples": str(self._sample), "saturated": str(self._axis.saturated)}
 
     def _measure(self, stamp: int) -> None:

@@ -42,6 +42,7 @@ _FRICTION_MODEL = "fric_interfaces/msg/FrictionModel"
 _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _DEPTH = 1000  # messages kept for a slow reliable subscriber
 _CLOCK_TICK = 0.01  # [s] of the recording between two messages on /clock
+_MATCHING = 0.2  # [s] the subscribers' side learns of the match somewhat later, and would miss the first messages
 _SETTLE_LIMIT = 4.0  # [s]; Fast DDS asks for acknowledgements every 3 s when nothing else is published
 
 
@@ -194,6 +195,8 @@ class PlayerNode(OrderlyNode):
                     f"{count()} of {wanted} subscriptions within {patience:g} s",
                     "start the subscribers first, or raise wait_timeout",
                 )
+        if wanted:
+            self.stop.wait(_MATCHING)
 
 
 def _playing_qos(recorded: Qos | None, msgtype: str) -> QoSProfile:

@@ -14,7 +14,10 @@ SAMPLES = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=128, reliability=Rel
 """``joint_states``, ``reference``, ``feedforward_force``, ``force_command``."""
 
 MODEL = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 """``friction/model``: the last one, also for a node that starts later."""
 

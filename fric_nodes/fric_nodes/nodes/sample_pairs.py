@@ -1,8 +1,10 @@
-"""Pairing positions with the efforts that act after them, from streams that say it in different ways; no ROS in here.
+"""Pairing positions with efforts, from streams that say in different ways when an effort acts; no ROS in here.
 
-The identifier wants for each position the effort from its stamp to the next one. A joint state may carry the effort of the
-interval before it, of the interval after it, or a sampled continuous signal; or it carries none, and the force command has to
-serve: by its stamp in lock-step, by the time of reception otherwise (the last command before the state, held).
+The identifier wants for each position the effort at its stamp; where an effort is constant from one stamp to the next, that is
+the mean of the interval before and the interval after (as in :mod:`fric_nodes.identification.equations`). A joint state may
+carry the effort of the interval before it, of the interval after it, or a sampled continuous signal; or it carries none, and
+the force command has to serve: by its stamp in lock-step, by the time of reception otherwise (the last one before the state,
+held).
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ class Sample(NamedTuple):
 
 
 class EffortPairing:
-    """Turns samples as they come into samples whose effort acts from their stamp on.
+    """Turns samples as they come into samples with the effort at their stamp.
 
     Args:
         hold: what the effort of a joint state means: ``"preceding"``, ``"following"`` or ``"linear"``.
@@ -72,26 +74,29 @@ class EffortPairing:
         pairs: list[Sample] = []
         while self._waiting:
             sample = self._waiting[0]
-            if not math.isnan(sample.effort):
-                paired = self._own_effort(sample)
-            else:
+            following = sample
+            if math.isnan(sample.effort):
                 self.lacks_effort = True
                 force = self._command_for(sample, before)
                 if force is None:
                     break
-                paired = sample._replace(effort=force)
-            self._last = self._waiting.popleft()
+                following = sample._replace(effort=force)
+            paired = self._at_stamp(following, self._hold if following is sample else "following")
+            self._waiting.popleft()
+            self._last = following
             if paired is not None and not math.isnan(paired.effort):
                 pairs.append(paired)
         return pairs
 
-    def _own_effort(self, sample: Sample) -> Sample | None:
-        last = self._last
-        if self._hold == "following":
+    def _at_stamp(self, sample: Sample, hold: str) -> Sample | None:
+        """The newest sample whose effort at its stamp is known now."""
+        if hold == "linear":
             return sample
+        last = self._last
         if last is None or sample.time < last.time:
             return None
-        return last._replace(effort=sample.effort if self._hold == "preceding" else 0.5 * (last.effort + sample.effort))
+        mean = 0.5 * (last.effort + sample.effort)
+        return (sample if hold == "following" else last)._replace(effort=mean)
 
     def _command_for(self, sample: Sample, before: int) -> float | None:
         """The command that acts from the sample on; None while it may still come; NaN when there is none."""

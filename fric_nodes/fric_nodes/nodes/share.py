@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 
@@ -20,10 +21,8 @@ def share_file(name: str) -> Path:
     """
     installed = Path(sys.prefix) / "share" / "fric_nodes"
     places = [installed, Path(__file__).resolve().parents[3]]
-    try:
+    with contextlib.suppress(PackageNotFoundError, OSError):  # an installation by pip sets no AMENT_PREFIX_PATH, and needs none
         places.insert(0, Path(get_package_share_directory("fric_nodes")))
-    except (PackageNotFoundError, OSError):
-        pass  # an installation by pip sets no AMENT_PREFIX_PATH, and needs none
     for place in places:
         if (place / name).is_file():
             return place / name

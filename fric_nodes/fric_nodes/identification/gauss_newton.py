@@ -1,0 +1,136 @@
+"""Nonlinear least squares within bounds, for many residuals and few parameters.
+
+Gauss-Newton steps with Levenberg-Marquardt damping on the normal equations, columns scaled to one:
+
+    (A + mu D) d = -g,   A = J'J,  g = J'r,  D = diag(A),   lower <= x + d <= upper,
+
+bounds by an active set: a component that would leave is put on its bound and the rest solved again. The damping follows the ratio of
+actual to predicted decrease (Nielsen 1999). Only sums over the residuals are kept of a Jacobian, so that an iteration costs its
+n_parameters + 1 evaluations and little else; a decomposition of the whole Jacobian costs more than the simulations that it comes from.
+Source: Madsen, Nielsen, Tingleff 2004, section 3.2; the active set is that of Bertsekas 1982 for simple bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..record import Array
+
+__all__ = ["Solution", "minimise"]
+
+_REACH = 0.7
+_REACH_FROM_ZERO = 0.3
+_FIRST_DAMPING = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where the sum of squares is smallest.
+
+    Attributes:
+        point: shape ``(n_parameters,)``.
+        residual: there, shape ``(n,)``.
+        jacobian: there, shape ``(n, n_parameters)``.
+        converged: False when the limit of iterations was reached before.
+        iterations: number of Jacobians.
+    """
+
+    point: Array
+    residual: Array
+    jacobian: Array
+    converged: bool
+    iterations: int
+
+
+def minimise(
+    function: Callable[[Array], Array],
+    start: Array,
+    lower: Array,
+    upper: Array,
+    *,
+    difference: float = 1e-5,
+    point_tolerance: float = 1e-6,
+    cost_tolerance: float = 1e-8,
+    max_iterations: int = 60,
+) -> Solution:
+    """The point within bounds at which the sum of squares of ``function`` is smallest, near ``start``.
+
+    Args:
+        function: residuals, shape ``(n,)``, finite everywhere.
+        start: shape ``(n_parameters,)``, of the order of one.
+        lower: bounds, shape ``(n_parameters,)``.
+        upper: bounds, shape ``(n_parameters,)``.
+        difference: step of the forward differences, relative.
+        point_tolerance: relative step at which to stop.
+        cost_tolerance: relative decrease, predicted by the linear model, at which to stop.
+        max_iterations: limit.
+    """
+    point = np.clip(start, lower, upper)
+    residual = function(point)
+    cost = float(residual @ residual)
+    damping, growth = _FIRST_DAMPING, 2.0
+    jacobian = np.empty((residual.shape[0], point.shape[0]))
+    for iteration in range(1, max_iterations + 1):
+        _differences(function, point, residual, upper, difference, jacobian)
+        normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
+        for _ in range(30):
+            # No parameter loses more than most of its size at once: a scale that has shrunk to nothing has no slope to come back by.
+            reach = _REACH * np.maximum(np.abs(point), _REACH_FROM_ZERO)
+            step = _bounded_step(normal, gradient, damping, np.maximum(lower - point, -reach), np.minimum(upper - point, reach))
+            # Decrease of the sum of squares that the linear model promises.
+            promised = -float(step @ (2.0 * gradient + normal @ step))
+            if promised <= cost_tolerance * cost or np.all(np.abs(step) <= point_tolerance * (np.abs(point) + point_tolerance)):
+                return Solution(point, residual, jacobian, True, iteration)
+            trial = np.clip(point + step, lower, upper)
+            trial_residual = function(trial)
+            trial_cost = float(trial_residual @ trial_residual)
+            gain = (cost - trial_cost) / promised
+            if gain > 0.0:
+                point, residual, cost = trial, trial_residual, trial_cost
+                damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 1e-12)
+                growth = 2.0
+                break
+            damping *= growth
+            growth *= 2.0
+        else:
+            # No direction goes down: the differences have said all they can.
+            return Solution(point, residual, jacobian, True, iteration)
+    _differences(function, point, residual, upper, difference, jacobian)
+    return Solution(point, residual, jacobian, False, max_iterations)
+
+
+def _differences(
+    function: Callable[[Array], Array], point: Array, residual: Array, upper: Array, difference: float, jacobian: Array
+) -> None:
+    """Forward differences into ``jacobian``; backward where the bound is in the way."""
+    for number in range(point.shape[0]):
+        shift = difference * max(abs(float(point[number])), 1e-3)
+        if point[number] + shift > upper[number]:
+            shift = -shift
+        moved = point.copy()
+        moved[number] += shift
+        jacobian[:, number] = (function(moved) - residual) / (moved[number] - point[number])
+
+
+def _bounded_step(normal: Array, gradient: Array, damping: float, lowest: Array, highest: Array) -> Array:
+    """Step that minimises the damped quadratic model within ``lowest`` to ``highest``, approximately where bounds bind."""
+    size = np.sqrt(np.diag(normal))
+    free = size > 0.0
+    step = np.zeros(gradient.shape[0])
+    # At a bound with the gradient pointing out, a parameter stays.
+    free &= ~((lowest >= 0.0) & (gradient > 0.0)) & ~((highest <= 0.0) & (gradient < 0.0))
+    while np.any(free):
+        scale = size[free]
+        scaled = normal[np.ix_(free, free)] / np.outer(scale, scale)
+        load = gradient[free] + normal[np.ix_(free, ~free)] @ step[~free]
+        found = np.linalg.lstsq(scaled + damping * np.eye(scale.shape[0]), -load / scale, rcond=1e-14)[0] / scale
+        clipped = np.clip(found, lowest[free], highest[free])
+        out = clipped != found
+        step[free] = clipped
+        if not np.any(out):
+            break
+        free[np.flatnonzero(free)[out]] = False
+    return step

@@ -1,0 +1,133 @@
+"""The compensator as a node: models by file, topic and service, without a jump; refusals; switching."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from fric_nodes.model import Model, build_model, term
+from fric_nodes.model_file import write_model
+from fric_nodes.nodes.compensator import CompensatorNode
+from fric_nodes.nodes.convert import model_to_message, set_stamp
+from fric_nodes.nodes.lean_executor import LeanExecutor
+from fric_nodes.nodes.qos import MODEL
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from std_msgs.msg import Float64
+
+from fric_interfaces.msg import FrictionModel, Reference
+from fric_interfaces.srv import LoadModel
+
+if TYPE_CHECKING:
+    from .conftest import Graph
+
+H = 0.01
+
+
+def _model(level: float) -> Model:
+    return build_model("rigid", {"mass": 1.0}, [term("coulomb", force=level)])
+
+
+class Bench:
+    """Sends references at a constant velocity of 1 m/s and keeps the forces."""
+
+    def __init__(self, graph: Graph, **parameters: object) -> None:
+        overrides = [Parameter(key, value=value) for key, value in {"period": H, "transition_time": 0.2, **parameters}.items()]
+        self.compensator = graph.owns(CompensatorNode(context=graph.context(), parameter_overrides=overrides))
+        graph.spin(self.compensator, kind=LeanExecutor)
+        self.graph, self.forces, self._k = graph, [], 0
+        self.node = graph.node("bench")
+        self.node.create_subscription(Float64, "feedforward_force", lambda m: self.forces.append(m.data), 1000)
+        self._references = self.node.create_publisher(Reference, "reference", 1000)
+        self.models = self.node.create_publisher(FrictionModel, "friction/model", MODEL)
+        graph.spin(self.node)
+        graph.until(
+            lambda: self._references.get_subscription_count() and self.compensator.count_subscribers("feedforward_force"),
+            "a pair",
+        )
+
+    def send(self, n: int, velocity: float = 1.0) -> list[float]:
+        """Forces for the next ``n`` references."""
+        start = len(self.forces)
+        for _ in range(n):
+            self._k += 1
+            message = Reference(position=self._k * H, velocity=velocity)
+            set_stamp(message.header.stamp, round(self._k * H * 1e9))
+            self._references.publish(message)
+        self.graph.until(lambda: len(self.forces) >= start + n, "an answer to each")
+        return self.forces[start:]
+
+    def call(self, kind: type[Any], name: str, request: Any) -> Any:
+        client = self.node.create_client(kind, name)
+        assert client.wait_for_service(10.0)
+        future = client.call_async(request)
+        self.graph.until(future.done, f"an answer of {name}")
+        return future.result()
+
+
+def test_without_a_model_the_force_is_zero_but_comes(graph: Graph) -> None:
+    assert Bench(graph).send(10) == [0.0] * 10
+
+
+def test_model_by_service_from_a_file_comes_in_without_a_jump(graph: Graph) -> None:
+    write_model(_model(3.0), graph.folder / "old.yaml")
+    write_model(_model(8.0), graph.folder / "new.yaml")
+    bench = Bench(graph, model_file=str(graph.folder / "old.yaml"))
+    before = bench.send(5)
+    assert np.allclose(before, 3.0)
+    answer = bench.call(LoadModel, "compensator/load_model", LoadModel.Request(path=str(graph.folder / "new.yaml")))
+    assert answer.success, answer.message
+    after = bench.send(40)
+    assert np.abs(np.diff([*before, *after])).max() <= 5.0 * H / 0.2 + 1e-9
+    assert math.isclose(after[-1], 8.0)
+
+
+def test_model_by_topic_and_by_message(graph: Graph) -> None:
+    bench = Bench(graph)
+    bench.models.publish(model_to_message(_model(4.0), 0))
+    graph.until(lambda: bench.compensator.counters["models"] == 1, "the model is taken over")
+    assert math.isclose(bench.send(40)[-1], 4.0)
+    answer = bench.call(LoadModel, "compensator/load_model", LoadModel.Request(model=model_to_message(_model(6.0), 0)))
+    assert answer.success, answer.message
+    assert math.isclose(bench.send(40)[-1], 6.0)
+
+
+def test_bad_models_and_references_are_refused_and_the_old_model_stays(graph: Graph) -> None:
+    write_model(_model(3.0), graph.folder / "old.yaml")
+    (graph.folder / "bad.yaml").write_text("format: fric-model/1\n", encoding="utf-8")
+    bench = Bench(graph, model_file=str(graph.folder / "old.yaml"))
+    bad = model_to_message(_model(4.0), 0)
+    bad.terms[0].parameters[0].value = math.nan
+    stranger = model_to_message(_model(4.0), 0)
+    stranger.joint = "elbow"
+    bench.models.publish(bad)
+    graph.until(lambda: bench.compensator.counters["refused model"] == 1, "a refusal of NaN")
+    bench.models.publish(stranger)
+    graph.until(lambda: bench.compensator.counters["refused model"] == 2, "a refusal of another joint's model")
+    for path in ("bad.yaml", "missing.yaml"):
+        answer = bench.call(LoadModel, "compensator/load_model", LoadModel.Request(path=str(graph.folder / path)))
+        assert not answer.success
+        assert path in answer.message
+    reference = Reference(velocity=math.inf)
+    bench._references.publish(reference)
+    graph.until(lambda: bench.compensator.counters["refused reference"] == 1, "a refusal of an infinite velocity")
+    assert np.allclose(bench.send(30), 3.0)
+
+
+def test_enabled_can_be_set_at_run_time_and_other_things_cannot(graph: Graph) -> None:
+    write_model(_model(3.0), graph.folder / "old.yaml")
+    bench = Bench(graph, model_file=str(graph.folder / "old.yaml"))
+    bench.send(5)
+
+    def set_parameter(name: str, value: object) -> Any:
+        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        return bench.call(SetParameters, "compensator/set_parameters", request).results[0]
+
+    assert set_parameter("enabled", False).successful
+    off = bench.send(40)
+    assert off[-1] == 0.0
+    assert np.abs(np.diff(off)).max() <= 3.0 * H / 0.2 + 1e-9
+    refused = set_parameter("preview", 11.0)
+    assert not refused.successful
+    assert not set_parameter("model_file", "x").successful

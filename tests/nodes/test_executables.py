@@ -1,0 +1,70 @@
+"""Every executable starts, answers for its parameters, and ends cleanly on SIGINT."""
+
+from __future__ import annotations
+
+import importlib.util
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from rcl_interfaces.srv import ListParameters
+
+import fric_nodes
+
+if TYPE_CHECKING:
+    from .conftest import Graph
+
+LISTED = Path(__file__).resolve().parents[2] / "fric_nodes" / "resource" / "executables"
+NODES = LISTED.read_text(encoding="utf-8").split()
+INSTALLED = Path(sys.prefix) / "lib" / "fric_nodes"
+
+
+def _start(graph: Graph, name: str) -> subprocess.Popen[str]:
+    extra = ["-p", f"bag:={graph.folder / 'bag'}"] if name == "recorder" else []
+    # The installed executables run the installed package; from a source tree the modules stand in for them.
+    under_test = Path(fric_nodes.__file__).resolve().is_relative_to(Path(sys.prefix).resolve())
+    command = [str(INSTALLED / name)] if under_test else [sys.executable, "-m", f"fric_nodes.nodes.{name}"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen([*command, "--ros-args", *extra], env=graph.environment, cwd=graph.folder, **pipes)
+    graph._processes.append(process)
+    return process
+
+
+def test_list_is_complete() -> None:
+    assert set(NODES) >= {"plant", "excitation", "compensator", "pid", "recorder", "player", "identifier"}
+    for name in NODES:
+        assert importlib.util.find_spec(f"fric_nodes.nodes.{name}"), name
+
+
+def test_each_starts_answers_and_stops_on_sigint(graph: Graph) -> None:
+    # The player plays a bag and ends; it has its own tests.
+    names = [name for name in NODES if name != "player"]
+    running = {name: _start(graph, name) for name in names}
+    node = graph.node("asker")
+    graph.spin(node)
+    for name, process in running.items():
+        client = node.create_client(ListParameters, f"{name}/list_parameters")
+        graph.until(lambda c=client, p=process: c.service_is_ready() or p.poll() is not None, f"{name} is there")
+        assert process.poll() is None, graph.finish(process)
+        future = client.call_async(ListParameters.Request())
+        graph.until(future.done, f"an answer of {name}")
+        result = future.result()
+        assert result is not None
+        assert len(result.result.names) > 3
+    for name, process in running.items():
+        status, out, error = graph.finish(process, signal.SIGINT)
+        assert status == 0, f"{name}: {out}{error}"
+        assert "Traceback" not in error, f"{name}: {error}"
+
+
+@pytest.mark.parametrize("name", ["plant", "pid"])
+def test_sigint_while_it_starts_is_no_fault(graph: Graph, name: str) -> None:
+    process = _start(graph, name)
+    node = graph.node("watcher")
+    graph.until(lambda: node.count_publishers("/rosout") > 1, "the node appears")
+    status, _, error = graph.finish(process, signal.SIGINT)
+    assert status in (0, -signal.SIGINT)
+    assert "Traceback" not in error
