@@ -23,7 +23,7 @@ __all__ = ["Solution", "minimise"]
 
 _REACH = 0.7
 _REACH_FROM_ZERO = 0.3
-_FIRST_DAMPING = 1e-4
+_FIRST_DAMPING = 1e-5
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
 
-from fric_interfaces.msg import Reference, StampedForce
+from fric_interfaces.msg import Reference
 
 from ..excitation import EXCITATIONS
 from ..excitation.sequence import Sequence
 from ..record import Units
 from .base import LOCK_STEP, PERIOD, LoopNode, wall_clock
 from .convert import from_seconds, nanoseconds, set_stamp
+from .forces import STAMPED, ForcePublisher
 from .main import run
 from .parameters import NodeParameter, from_declaration
 from .qos import SAMPLES
@@ -36,7 +36,7 @@ PARAMETERS = (
     NodeParameter(
         "output", "reference", "what is published; force: position is the force [N or N m]", choices=("reference", "force")
     ),
-    NodeParameter("stamped", False, "wall time, output force: publish StampedForce instead of Float64; lock-step always does"),
+    STAMPED,
     NodeParameter(
         "look_ahead", 16, "lock-step: samples sent ahead of the plant; makes no difference to the numbers", "", 0, 64
     ),
@@ -60,13 +60,11 @@ class ExcitationNode(LoopNode):
             kind = EXCITATIONS[name]
             parts.append(kind.plan({p.name: settings.number(f"{name}.{p.name}") for p in kind.parameters}, random))
         self._plan = Sequence(parts, settings.number("start_delay"), settings.number("pause"), settings.flag("repeat"))
-        self._forces = settings.text("output") == "force"
-        stamped = self.lock_step or not self._forces or settings.flag("stamped")
-        kind_of_message = (StampedForce if stamped else Float64) if self._forces else Reference
-        self._message = kind_of_message()
-        if stamped:
-            self._message.header.frame_id = self.joint
-        self._publisher = self.create_publisher(kind_of_message, "force_command" if self._forces else "reference", SAMPLES)
+        self._forces = ForcePublisher(self, "force_command") if settings.text("output") == "force" else None
+        if self._forces is None:
+            self._reference = Reference()
+            self._reference.header.frame_id = self.joint
+            self._references = self.create_publisher(Reference, "reference", SAMPLES)
         self.get_logger().info(f"{', '.join(settings.texts('kinds'))}: {self._plan.duration:.1f} s")
         if self.lock_step:
             self._period_ns = from_seconds(self.period)
@@ -86,16 +84,17 @@ class ExcitationNode(LoopNode):
         return {"planned duration [s]": f"{self._plan.duration:.3f}"}
 
     def _publish(self, stamp: int, position: float, velocity: float, acceleration: float) -> None:
-        message = self._message
-        if isinstance(message, Float64):
-            message.data = position
-        else:
-            set_stamp(message.header.stamp, stamp)
-            if isinstance(message, StampedForce):
-                message.force = position
-            else:
-                message.position, message.velocity, message.acceleration = position, velocity, acceleration
-        self._publisher.publish(message)
+        if self._forces is not None:
+            self._forces.publish(stamp, position)
+            return
+        message = self._reference
+        set_stamp(message.header.stamp, stamp)
+        message.position, message.velocity, message.acceleration = position, velocity, acceleration
+        self._references.publish(message)
+
+    def _present(self) -> int:
+        """Number of nodes that listen."""
+        return self._references.get_subscription_count() if self._forces is None else self._forces.listeners()
 
     # Lock-step
 
@@ -128,7 +127,7 @@ class ExcitationNode(LoopNode):
         now = time.monotonic_ns()
         if self._start is None:
             # The motion starts when somebody is there to follow it, and not before.
-            if self._publisher.get_subscription_count() < self._listeners:
+            if self._present() < self._listeners:
                 return
             self._start = now
         position, velocity, acceleration = self._plan.at(np.array([(now - self._start) * 1e-9]))

@@ -18,7 +18,8 @@ from fric_interfaces.msg import Reference, StampedForce
 
 from ..control.pid import Pid, PidGains
 from .base import LOCK_STEP, PERIOD, LoopNode
-from .convert import JointSample, MessageError, from_seconds, joint_sample, nanoseconds, set_stamp
+from .convert import JointSample, MessageError, from_seconds, joint_sample
+from .forces import STAMPED, ForcePublisher, ReferencePoint, force_in, force_type, reference_in
 from .lockstep import Stream
 from .main import run
 from .parameters import NodeParameter
@@ -43,7 +44,7 @@ PARAMETERS = (
     NodeParameter(
         "reference_timeout", 0.1, "wall time: hold the last position when references stop for so long", "s", 1e-3, 1e6
     ),
-    NodeParameter("stamped", False, "wall time: use StampedForce instead of Float64; lock-step always does"),
+    STAMPED,
 )
 
 
@@ -60,21 +61,17 @@ class PidNode(LoopNode):
         self._pid = Pid(self._gains(), settings.number("force_limit"))
         settings.when_changed(self._on_settings)
         self._adds = settings.flag("use_feedforward")
-        stamped = self.lock_step or settings.flag("stamped")
-        self._message = StampedForce() if stamped else Float64()
-        if stamped:
-            self._message.header.frame_id = self.joint
         self._answered = -1
         self._references: Stream[float] = Stream()
         self._forces: Stream[float] = Stream()
         self._pending: JointSample | None = None
-        self._reference: tuple[int, Reference] | None = None
+        self._reference: ReferencePoint | None = None
         self._feedforward = (-math.inf, 0.0)
-        self._publisher = self.create_publisher(type(self._message), "force_command", SAMPLES)
+        self._commands = ForcePublisher(self, "force_command")
         self.create_subscription(JointState, "joint_states", self._on_state, SAMPLES)
         self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
         if self._adds:
-            self.create_subscription(StampedForce if stamped else Float64, "feedforward_force", self._on_feedforward, SAMPLES)
+            self.create_subscription(force_type(self), "feedforward_force", self._on_feedforward, SAMPLES)
 
     def _gains(self) -> PidGains:
         value = self.settings.number
@@ -91,25 +88,27 @@ class PidNode(LoopNode):
         """What the node adds to its report."""
         return {"saturated": str(self._pid.saturated)}
 
-    def _on_reference(self, reference: Reference) -> None:
-        p, v, a = reference.position, reference.velocity, reference.acceleration
-        if not (math.isfinite(p) and math.isfinite(v) and math.isfinite(a)):
-            self.refuse("reference", f"position {p}, velocity {v}, acceleration {a}")
-        elif self.lock_step:
-            self._references.put(nanoseconds(reference.header.stamp), p)
+    def _on_reference(self, message: Reference) -> None:
+        try:
+            reference = reference_in(message)
+        except MessageError as error:
+            self.refuse("reference", error)
+            return
+        self._reference = reference
+        if self.lock_step:
+            self._references.put(reference.stamp, reference.position)
             self._answer()
-        else:
-            self._reference = (nanoseconds(reference.header.stamp), reference)
 
     def _on_feedforward(self, message: StampedForce | Float64) -> None:
-        force = message.data if isinstance(message, Float64) else message.force
-        if not math.isfinite(force):
-            self.refuse("feedforward", f"force is {force}")
-        elif self.lock_step:
-            self._forces.put(nanoseconds(message.header.stamp), force)
+        try:
+            stamp, force = force_in(message)
+        except MessageError as error:
+            self.refuse("feedforward", error)
+            return
+        self._feedforward = (time.monotonic(), force)
+        if self.lock_step:
+            self._forces.put(stamp, force)
             self._answer()
-        else:
-            self._feedforward = (time.monotonic(), force)
 
     def _on_state(self, message: JointState) -> None:
         try:
@@ -122,21 +121,12 @@ class PidNode(LoopNode):
         else:
             self._follow(state)
 
-    def _publish(self, stamp: int, force: float) -> None:
-        message = self._message
-        if isinstance(message, Float64):
-            message.data = force
-        else:
-            set_stamp(message.header.stamp, stamp)
-            message.force = force
-        self._publisher.publish(message)
-
     # Lock-step
 
     def _on_step(self, state: JointSample) -> None:
         if state.stamp == self._answered:
             self.counters["repeated states"] += 1
-            self._publisher.publish(self._message)
+            self._commands.repeat()
             return
         if state.stamp < self._answered:
             self.counters["restarts"] += 1
@@ -153,7 +143,7 @@ class PidNode(LoopNode):
         feedforward = self._forces.get(state.stamp) if self._adds else 0.0
         if reference is None or feedforward is None:
             return
-        self._publish(state.stamp, self._pid.step(reference, state.position, self.period, feedforward))
+        self._commands.publish(state.stamp, self._pid.step(reference, state.position, self.period, feedforward))
         self._answered, self._pending = state.stamp, None
         self._references.forget_before(state.stamp)
         self._forces.forget_before(state.stamp)
@@ -164,12 +154,12 @@ class PidNode(LoopNode):
     def _setpoint(self, state: JointSample) -> float:
         """Position wanted at the stamp of ``state`` [x]."""
         if self._reference is None:
-            self._reference = (state.stamp, Reference(position=state.position))
-        stamp, reference = self._reference
+            self._reference = ReferencePoint(state.stamp, state.position, 0.0, 0.0)
+        stamp, position, velocity, acceleration = self._reference
         ahead = (state.stamp - stamp) * 1e-9
         if abs(ahead) > self.settings.number("reference_timeout"):
-            return float(reference.position)
-        return float(reference.position + ahead * (reference.velocity + 0.5 * ahead * reference.acceleration))
+            return position
+        return position + ahead * (velocity + 0.5 * ahead * acceleration)
 
     def _follow(self, state: JointSample) -> None:
         if state.stamp <= self._answered and self._answered - state.stamp < from_seconds(1.0):
@@ -183,7 +173,9 @@ class PidNode(LoopNode):
         given, force = self._feedforward
         now = time.monotonic()
         fresh = now - given <= self.settings.number("feedforward_timeout")
-        self._publish(state.stamp, self._pid.step(self._setpoint(state), state.position, duration, force if fresh else 0.0))
+        self._commands.publish(
+            state.stamp, self._pid.step(self._setpoint(state), state.position, duration, force if fresh else 0.0)
+        )
         self._answered = state.stamp
         self.deadlines.tick(now)
         self.deadlines.latency((time.time_ns() - state.stamp) * 1e-9)

@@ -20,7 +20,8 @@ from fric_interfaces.msg import StampedForce
 from ..axis import SimulatedAxis
 from ..model_file import read_model
 from .base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent, wall_clock
-from .convert import from_seconds, nanoseconds, set_stamp
+from .convert import MessageError, from_seconds, set_stamp
+from .forces import STAMPED, force_in, force_type
 from .lockstep import Stream
 from .main import run
 from .parameters import NodeParameter
@@ -41,7 +42,7 @@ PARAMETERS = (
     NodeParameter("watchdog_time", 0.1, "wall time: without a command for so long the force is zero", "s", 1e-3, 1e6),
     NodeParameter("retry_time", 0.2, "lock-step: repeat the state when no command has come for so long", "s", 1e-2, 1e3),
     NodeParameter("duration", 0.0, "end after so much time of the axis; 0: endless", "s", 0.0, 1e9),
-    NodeParameter("stamped", False, "wall time: take StampedForce instead of Float64; lock-step always does"),
+    STAMPED,
 )
 
 
@@ -72,15 +73,12 @@ class PlantNode(LoopNode):
         self._state = JointState(name=[self.joint], position=[0.0])
         self._state.header.frame_id = self.joint
         self._publisher = self.create_publisher(JointState, "joint_states", SAMPLES)
-        stamped = self.lock_step or settings.flag("stamped")
-        self.create_subscription(
-            StampedForce if stamped else Float64, "force_command", self._on_step if self.lock_step else self._on_force, SAMPLES
-        )
+        self.create_subscription(force_type(self), "force_command", self._on_command, SAMPLES)
         if self.lock_step:
             self._period_ns = from_seconds(self.period)
             self._commands: Stream[float] = Stream()
-            self._started = self._repeated_at = -1.0
-            self._answered = -1
+            self._started = -1.0
+            self._seen = -1
             self._measure(0)
             self.create_timer(settings.number("retry_time"), self._retry)
         else:
@@ -111,13 +109,23 @@ class PlantNode(LoopNode):
             self.finish()
         return True
 
+    def _on_command(self, message: StampedForce | Float64) -> None:
+        try:
+            stamp, force = force_in(message)
+        except MessageError as error:
+            self.refuse("command", error)
+            return
+        if self.lock_step:
+            self._on_step(stamp, force)
+            return
+        now = time.monotonic_ns()
+        self._advance_to(now)
+        self._commanded, self._force, self._fed = now, force, True
+
     # Lock-step
 
-    def _on_step(self, command: StampedForce) -> None:
-        if not math.isfinite(command.force):
-            self.refuse("command", f"force is {command.force}")
-            return
-        self._commands.put(nanoseconds(command.header.stamp), command.force)
+    def _on_step(self, stamp: int, command: float) -> None:
+        self._commands.put(stamp, command)
         while (force := self._commands.get(self._sample * self._period_ns)) is not None:
             if self._sample >= self._last_sample:
                 return
@@ -135,10 +143,10 @@ class PlantNode(LoopNode):
             self._end_if_due()
 
     def _retry(self) -> None:
-        if self._sample == self._answered:
+        if self._sample == self._seen:
             self.counters["repeated states"] += 1
             self._publisher.publish(self._state)
-        self._answered = self._sample
+        self._seen = self._sample
 
     # Wall time
 
@@ -154,15 +162,6 @@ class PlantNode(LoopNode):
             self.get_logger().warning("no command within the watchdog time, force is zero", throttle_duration_sec=1.0)
         self._axis.advance(self._force, (now - self._now) * 1e-9)
         self._now = now
-
-    def _on_force(self, command: Float64 | StampedForce) -> None:
-        force = command.data if isinstance(command, Float64) else command.force
-        if not math.isfinite(force):
-            self.refuse("command", f"force is {force}")
-            return
-        now = time.monotonic_ns()
-        self._advance_to(now)
-        self._commanded, self._force, self._fed = now, force, True
 
     def _tick(self) -> None:
         if self._end_if_due():

@@ -1,0 +1,223 @@
+"""Inverse dynamics on an axis simulated elsewhere: values, standard errors, and what it must say when a recording can't tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from fric_nodes.identification import METHODS
+from fric_nodes.identification.result import Identification, IdentificationError, Options
+from fric_nodes.model import Model, Term, build_model, term
+from fric_nodes.record import Record
+
+FIT = METHODS["inverse-dynamics"].fit
+
+
+def structure(*more: Term, asymmetry: bool = True) -> Model:
+    terms = [term("coulomb", force=1.0), term("viscous", coefficient=1.0), term("bias", force=0.0), *more]
+    return build_model("rigid", {"mass": 1.0}, [*terms, term("asymmetry")] if asymmetry else terms)
+
+
+TRUE = {"mass": 2.0, "coulomb.force": 8.0, "viscous.coefficient": 15.0, "bias.force": 0.8, "asymmetry.coefficient": 2.0}
+
+
+def assert_near(found: Identification, expected: dict[str, float], percent: float, errors: float = 4.0) -> None:
+    for name, value in expected.items():
+        got, error = found.model.value(name), found.model.standard_errors[name]
+        assert abs(got - value) <= errors * error + 1e-3 * abs(value), (name, got, value, error)
+        assert abs(got - value) <= 0.01 * percent * abs(value), (name, got, value)
+
+
+def test_parameters_come_back_from_quantised_and_noisy_signals(slider: Any) -> None:
+    found = FIT(structure(), [slider.record(noise=0.3, resolution=1e-6)], Options())
+    assert_near(found, TRUE, percent=5.0)
+    assert found.model.value("mass") == pytest.approx(2.0, rel=0.005)
+    assert found.model.value("coulomb.force") == pytest.approx(8.0, rel=0.01)
+    assert found.train.relative_force_error_percent < 5.0
+    assert found.status.startswith("converged")
+
+
+def test_least_squares_is_what_numpy_finds_on_equations_built_here(slider: Any) -> None:
+    record = slider.record(noise=0.3, resolution=1e-6)
+    cutoff, keep, h = 50.0, 10, 1e-3
+    found = FIT(structure(), [record], Options(cutoff=cutoff, decimation=keep, rest_velocity=0.0))
+    # The published recipe: zero-phase Butterworth, central differences, zero-phase decimation of both sides.
+    q = signal.sosfiltfilt(signal.butter(4, cutoff, fs=1.0 / h, output="sos"), record.position)
+    v = np.gradient(q, h)
+    a = np.gradient(v, h)
+    u = record.effort
+    force = 0.5 * (u + np.r_[u[0], u[:-1]])  # held from sample to sample: the mean around the instant
+    sos = signal.cheby1(8, 0.05, 0.8 / keep, output="sos")
+    edge = int(5 / cutoff / h)
+    columns = [np.sign(v), v, np.ones_like(v), np.abs(v), a]
+    rows = np.stack([signal.sosfiltfilt(sos, column)[edge:-edge:keep] for column in columns], axis=1)
+    expected, *_ = np.linalg.lstsq(rows, signal.sosfiltfilt(sos, force)[edge:-edge:keep], rcond=None)
+    names = ("coulomb.force", "viscous.coefficient", "bias.force", "asymmetry.coefficient", "mass")
+    np.testing.assert_allclose([found.model.value(name) for name in names], expected, rtol=1e-6)
+
+
+def test_ninety_percent_intervals_hold_what_they_promise_under_coloured_noise(slider: Any) -> None:
+    # 0.9 per sample: a correlation time of 10 ms, noise that a filter at 100 Hz lets through.
+    estimates, errors = [], []
+    names = [name for name in TRUE if name != "asymmetry.coefficient"]
+    shorter = slice(0, 8000)
+    for seed in range(60):
+        record = slider.record(noise=1.0, seed=seed, colour=0.9)
+        record = Record(record.time[shorter], record.position[shorter], record.effort[shorter], effort_hold="following")
+        found = FIT(structure(), [record], Options())
+        estimates.append([found.model.value(name) for name in names])
+        errors.append([found.model.standard_errors[name] for name in names])
+    # Around the mean of the estimates: coverage is about the spread; bias has tests of its own.
+    off = np.array(estimates) - np.mean(estimates, axis=0)
+    inside = np.abs(off) <= 1.645 * np.array(errors)
+    assert 0.80 <= np.mean(inside) <= 0.97, np.mean(inside, axis=0)
+    assert np.all(np.mean(inside, axis=0) >= 0.75), np.mean(inside, axis=0)
+
+
+def test_estimates_are_unbiased_over_noise(slider: Any) -> None:
+    estimates = [
+        [FIT(structure(), [slider.record(noise=0.5, seed=seed)], Options()).model.value(name) for name in TRUE] for seed in range(8)
+    ]
+    np.testing.assert_allclose(np.mean(estimates, axis=0), list(TRUE.values()), rtol=0.02)
+
+
+def test_a_bias_and_an_asymmetric_level_are_named_and_one_is_held(slider: Any) -> None:
+    found = FIT(structure(), [slider.record(noise=0.3)], Options())
+    assert "asymmetry.force" not in found.fitted
+    assert found.model.value("asymmetry.force") == 0.0
+    assert "asymmetry.force" not in found.model.standard_errors
+    (message,) = [line for line in found.warnings if line.startswith("asymmetry.force")]
+    assert "bias.force" in message
+    assert "held at 0" in message
+    assert "push the resting body from both sides" in message
+
+
+def test_motion_in_one_direction_only_is_recognised() -> None:
+    # 10 s, never below 0.05 m/s.
+    t = 1e-3 * np.arange(10_000)
+    v = 0.15 + 0.1 * np.sin(2 * np.pi * 0.7 * t)
+    a = 0.1 * 2 * np.pi * 0.7 * np.cos(2 * np.pi * 0.7 * t)
+    q = np.cumsum(v) * 1e-3
+    u = 2.0 * a + 8.0 + 15.0 * v + 0.8 + 0.1 * np.random.default_rng(1).standard_normal(t.shape[0])
+    found = FIT(structure(asymmetry=False), [Record(t, q, u)], Options())
+    text = " ".join(found.warnings)
+    assert "coulomb.force" in text
+    assert "bias.force" in text
+    assert {"coulomb.force", "bias.force"} - set(found.fitted), "a constant can't be split into two"
+    held = ({"coulomb.force", "bias.force"} - set(found.fitted)).pop()
+    total = found.model.value("coulomb.force") + found.model.value("bias.force")
+    assert total == pytest.approx(8.8, rel=0.02), held
+
+
+def test_phases_at_rest_do_not_change_the_estimate(mover: Callable[..., Any]) -> None:
+    run = mover(duration=12.0)
+    clean = run.record(noise=0.3)
+    n_rest = 6000
+    rng = np.random.default_rng(5)
+    # It stands for six seconds while the drive pushes with what it likes, below break-away.
+    push = 6.0 + 0.3 * rng.standard_normal(n_rest)
+    last = clean.position[-1]
+    # A smooth way from the last velocity to rest, too short to weigh anything.
+    v_end = float(clean.position[-1] - clean.position[-2])
+    ease = last + v_end * 20.0 * (1.0 - np.exp(-np.arange(n_rest) / 20.0))
+    record = Record(
+        1e-3 * np.arange(12_000 + n_rest), np.r_[clean.position, ease], np.r_[clean.effort, push], effort_hold="following"
+    )
+    with_rest = FIT(structure(), [record], Options())
+    without = FIT(structure(), [clean], Options())
+    for name in TRUE:
+        error = without.model.standard_errors[name]
+        assert abs(with_rest.model.value(name) - without.model.value(name)) < 1.5 * error, name
+    assert any("at rest" in note for note in with_rest.notes)
+
+
+def test_a_recording_of_a_resting_joint_is_refused() -> None:
+    t = 1e-3 * np.arange(5000)
+    rng = np.random.default_rng(1)
+    still = np.full(5000, 0.123)
+    encoder = still + 1e-6 * np.round(rng.standard_normal(5000))
+    for position in (still, encoder):
+        with pytest.raises(IdentificationError, match="hardly moves"):
+            FIT(structure(), [Record(t, position, rng.standard_normal(5000))], Options())
+
+
+def test_spikes_in_the_force_hardly_touch_a_robust_fit(slider: Any) -> None:
+    record = slider.record(noise=0.3)
+    rng = np.random.default_rng(2)
+    spiked = record.effort.copy()
+    spiked[rng.choice(spiked.shape[0], 40, replace=False)] += 400.0
+    bad = replace(record, effort=spiked)
+    robust = FIT(structure(), [bad], Options(robust=True)).model
+    plain = FIT(structure(), [bad], Options()).model
+    assert robust.value("coulomb.force") == pytest.approx(8.0, rel=0.02)
+    assert robust.value("bias.force") == pytest.approx(0.8, rel=0.15)
+    assert abs(plain.value("bias.force") - 0.8) > 3 * abs(robust.value("bias.force") - 0.8)
+
+
+def test_the_stribeck_curve_comes_back(creeper: Any) -> None:
+    found = FIT(structure(term("stribeck", force=0.0, velocity=0.3)), [creeper.record(noise=0.2, resolution=1e-7)], Options())
+    assert found.model.value("stribeck.velocity") == pytest.approx(0.02, rel=0.08)
+    assert found.model.value("stribeck.force") == pytest.approx(4.0, rel=0.06)
+    assert found.model.value("coulomb.force") == pytest.approx(8.0, rel=0.03)
+    for name, value in (("stribeck.velocity", 0.02), ("stribeck.force", 4.0)):
+        assert abs(found.model.value(name) - value) < 5 * found.model.standard_errors[name]
+
+
+def test_a_stribeck_effect_that_is_not_there_is_reported_as_such(slider: Any) -> None:
+    found = FIT(structure(term("stribeck", force=1.0, velocity=0.01)), [slider.record(noise=0.3)], Options())
+    assert found.model.value("stribeck.force") < 0.2
+    assert "stribeck" in found.status
+
+
+def test_the_stiffness_of_the_bristles_comes_back(bristled: Any) -> None:
+    found = FIT(
+        structure(term("presliding", stiffness=1e4)),
+        [bristled.record(noise=0.2, resolution=1e-8)],
+        Options(cutoff=200.0, decimation=1),
+    )
+    assert found.model.value("presliding.stiffness") == pytest.approx(2e5, rel=0.2)
+    assert found.model.value("coulomb.force") == pytest.approx(8.0, rel=0.03)
+    assert found.model.value("mass") == pytest.approx(2.0, rel=0.03)
+
+
+def test_several_recordings_count_together(slider: Any, mover: Callable[..., Any]) -> None:
+    other = mover(duration=8.0, seed=9)
+    both = FIT(structure(), [slider.record(noise=0.5), other.record(noise=0.5, seed=2)], Options())
+    one = FIT(structure(), [other.record(noise=0.5, seed=2)], Options())
+    assert both.model.standard_errors["mass"] < one.model.standard_errors["mass"]
+    assert both.model.value("mass") == pytest.approx(2.0, rel=0.01)
+
+
+def test_invalid_samples_are_left_out(slider: Any) -> None:
+    record = slider.record(noise=0.3)
+    valid = np.ones(record.n_samples, dtype=bool)
+    valid[9000:10_000] = False
+    broken = replace(record, effort=np.where(valid, record.effort, 1e4), valid=valid)
+    found = FIT(structure(), [broken], Options())
+    assert_near(found, TRUE, percent=6.0)
+
+
+def test_held_parameters_stay_and_unknown_names_are_refused(slider: Any) -> None:
+    record = slider.record(noise=0.3)
+    start = structure().with_value("mass", 1.7)
+    found = FIT(start, [record], Options(held=("mass",)))
+    assert found.model.value("mass") == 1.7
+    assert "mass" not in found.fitted
+    with pytest.raises(Exception, match="no parameter 'masss'"):
+        FIT(start, [record], Options(held=("masss",)))
+
+
+@pytest.mark.parametrize("cutoff", [0.0, -1.0, 500.0, 1e4])
+def test_a_cutoff_outside_the_band_is_refused(slider: Any, cutoff: float) -> None:
+    with pytest.raises(IdentificationError, match="cutoff"):
+        FIT(structure(), [slider.record()], Options(cutoff=cutoff))
+
+
+def test_a_recording_that_is_too_short_is_refused(slider: Any) -> None:
+    with pytest.raises(IdentificationError, match="record for longer"):
+        FIT(structure(), [slider.record().slice(0, 60)], Options())
