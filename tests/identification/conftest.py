@@ -92,7 +92,28 @@ def wanted(time: Array, seed: int, travel: float, top: float) -> tuple[Array, Ar
     return q * fade, v * fade + q * slope
 
 
-def move(truth: Truth, duration: float = 20.0, seed: int = 3, travel: float = 0.1, top: float = 3.0, step: float = 1e-3) -> Run:
+def move_and_rest(truth: Truth, moving: float = 6.0, resting: float = 5.0, step: float = 1e-3) -> Run:
+    """As :func:`move`, with a rest in the middle during which the drive pushes as it likes, below break-away."""
+    n, n_rest = round(moving / step), round(resting / step)
+    # Time of the reference: runs, slows down within half a second, stands, and starts again.
+    ramp = np.linspace(1.0, 0.0, round(0.5 / step))
+    pace = np.concatenate([np.ones(n), ramp, np.zeros(n_rest), ramp[::-1], np.ones(n)])
+    inner = step * np.cumsum(pace)
+    q_d, v_d = wanted(inner, 3, 0.3, 3.0)
+    target, speed = q_d.tolist(), (v_d * pace).tolist()
+    first = n + ramp.shape[0]
+    time = step * np.arange(pace.shape[0])
+
+    def control(k: int, q: float, v: float) -> float:
+        if first + 100 < k < first + n_rest - 100:
+            return 4.0 * math.sin(0.013 * k) + 1.0
+        return 4000.0 * (target[k] - q) + 120.0 * (speed[k] - v)
+
+    position, force = truth.respond(control, time.shape[0], step)
+    return Run(time, position, force, truth)
+
+
+def move(truth: Truth, duration: float = 20.0, seed: int = 3, travel: float = 0.3, top: float = 3.0, step: float = 1e-3) -> Run:
     """``truth`` under a PD controller along a multisine."""
     time = step * np.arange(round(duration / step))
     q_d, v_d = wanted(time, seed, travel, top)
@@ -124,10 +145,16 @@ def bristled() -> Run:
 
 
 @pytest.fixture(scope="session")
+def pauser() -> Run:
+    """It rests for five seconds between two motions."""
+    return move_and_rest(Truth())
+
+
+@pytest.fixture(scope="session")
 def mover() -> Callable[..., Run]:
     """``move`` for tests with an axis of their own; ``mover(Truth-fields..., duration=...)``."""
 
-    def make(duration: float = 20.0, seed: int = 3, travel: float = 0.1, top: float = 3.0, **fields: float) -> Run:
+    def make(duration: float = 20.0, seed: int = 3, travel: float = 0.3, top: float = 3.0, **fields: float) -> Run:
         return move(replace(Truth(), **fields), duration, seed, travel, top)
 
     return make

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from fric_nodes.control.tuning import tune
 from fric_nodes.model import build_model, term
 from fric_nodes.model_file import write_model
 from fric_nodes.nodes.compensator import CompensatorNode
@@ -30,10 +31,11 @@ from fric_interfaces.msg import Reference
 if TYPE_CHECKING:
     from .conftest import Graph
 
-H = 0.004
+H = 0.01  # slow enough for any executor, with everything in one process, on a busy machine
 DEEP = QoSProfile(depth=20_000)
 MODEL = build_model("rigid", {"mass": 2.0}, [term("coulomb", force=5.0), term("viscous", coefficient=20.0)])
-GAINS = {"kp": 5e3, "ki": 2e4, "kd": 150.0, "filter_time": 0.002}
+_TUNED, _ = tune(2.0, 20.0, H, delay=0.5 * H, filter_time=0.2 * H)
+GAINS = {"kp": _TUNED.proportional, "ki": _TUNED.integral, "kd": _TUNED.derivative, "filter_time": _TUNED.filter_time}
 MOTION = {"multisine.duration": 60.0, "multisine.frequency_high": 2.0, "multisine.amplitude": 0.02, "multisine.speed": 0.1}
 
 
@@ -72,13 +74,18 @@ class Listener:
         for status in message.status:
             self.reports[status.name] = {pair.key: pair.value for pair in status.values}
 
-    def error(self, since: float) -> float:
-        """Root mean square of reference minus position over the states after ``since`` [s]; [m]."""
+    def follows(self, limit: float, seconds: float = 0.5) -> bool:
+        """True when the newest ``seconds`` [s] of states keep within ``limit`` [m] (root mean square) of the reference."""
+        if not self.states or not self.references:
+            return False
         states, references = np.array(self.states), np.array(self.references)
-        states = states[(states[:, 0] > since) & (states[:, 0] < references[-1, 0])]
-        assert len(states) > 20, f"{len(self.states)} states to {self.states[-1][0]}, references to {references[-1, 0]}, since {since}"
+        end = min(states[-1, 0], references[-1, 0])
+        states = states[(states[:, 0] > end - seconds) & (states[:, 0] < end)]
+        # Half of the states that there should be: a busy machine may hold some up.
+        if len(states) < 0.5 * seconds / H or np.ptp(references[references[:, 0] > end - seconds, 1]) < 2.0 * limit:
+            return False
         wanted = np.interp(states[:, 0], references[:, 0], references[:, 1])
-        return float(np.sqrt(np.mean((wanted - states[:, 1]) ** 2)))
+        return bool(np.sqrt(np.mean((wanted - states[:, 1]) ** 2)) < limit)
 
 
 def _seconds(message: Any) -> float:
@@ -97,10 +104,7 @@ def test_loop_follows_the_reference_in_one_process(graph: Graph, kind: type[Exec
         _make(graph, ExcitationNode, context, start_delay=0.2, **MOTION),
     ]
     graph.spin(*nodes, kind=kind)
-    graph.until(lambda: len(listener.states) > 400 and listener.references, "the loop runs")
-    moved = np.ptp([position for _, position, _ in listener.states])
-    assert moved > 5e-3
-    assert listener.error(listener.references[0][0] + 0.3) < 0.05 * moved
+    graph.until(lambda: listener.follows(5e-4), "the axis follows a reference that moves")
 
 
 def test_processes_come_and_go(graph: Graph) -> None:
@@ -111,16 +115,15 @@ def test_processes_come_and_go(graph: Graph) -> None:
         "excitation": {"period": H, "start_delay": 0.2, "multisine.ramp": 0.2, **MOTION},
     }
     running = {name: graph.start_node(name, **values) for name, values in parameters.items()}
-    graph.until(lambda: len(listener.states) > 100 and len(listener.references) > 100, "the loop runs")
+    graph.until(lambda: listener.follows(1e-3), "the axis follows")
     for name in ("pid", "plant"):
         running[name].kill()
         running[name].wait()
         running[name] = graph.start_node(name, **parameters[name])
         count = len(listener.commands)
         graph.until(lambda at=count: len(listener.commands) > at + 100, f"commands go on with a new {name}")
-        recovered = listener.states[-1][0] + 0.3
-        graph.until(lambda at=recovered: listener.states[-1][0] > at + 0.5, "some more states")
-        assert listener.error(recovered) < 2e-3
+        listener.states.clear()
+        graph.until(lambda: listener.follows(1e-3), f"the axis follows with a new {name}")
     for process in running.values():
         status, _, error = graph.finish(process, signal.SIGINT)
         assert status == 0, error

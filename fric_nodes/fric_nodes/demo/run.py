@@ -18,9 +18,9 @@ from ..identification import METHODS
 from ..identification.result import Identification, Options
 from ..identification.scoring import score
 from ..identification.screen import screened
-from ..model import Model, build_model, term
 from ..model_file import read_model, write_model
 from ..report.demo import DemoOutcome, demo_report
+from ..report.picture import write_picture
 from ..shared_files import config_file
 from .graph import Graph, NodeSetup, free_domain
 from .outcome import Run, read_run
@@ -50,28 +50,12 @@ class DemoSettings:
     seed: int = 1
 
 
-def _structure() -> Model:
-    """What the identifier assumes: which effects there may be, and nothing of their size."""
-    return build_model(
-        "rigid",
-        {"mass": 1.0},
-        [
-            term("coulomb", force=1.0),
-            term("stribeck", force=0.0, velocity=1.0),
-            term("asymmetry"),
-            term("viscous", coefficient=0.0),
-            term("bias", force=0.0),
-            term("presliding", stiffness=1.0),
-        ],
-    )
-
-
 def identify(bag: Path) -> Identification:
     """The model found in ``bag``, from nothing but the recording."""
     from ..bagio.read import read_record
 
     record = screened(read_record(bag, repair=True))
-    return METHODS["prediction-error"].fit(_structure(), [record], Options())
+    return METHODS["prediction-error"].fit(read_model(config_file("start_model.yaml")), [record], Options())
 
 
 def _nodes(settings: DemoSettings, gains: PidGains, motion: str, model: Path | None, bag: Path) -> list[NodeSetup]:
@@ -163,6 +147,7 @@ def run_demo(settings: DemoSettings, tell: Callable[[str], None]) -> DemoOutcome
         commands=_commands(settings, gains, model),
         rate=rate if settings.clock == "lock-step" else None,
     )
+    write_picture(outcome, settings.out / "picture.png")
     write_text(settings.out / "report.html", demo_report(outcome))
     return outcome
 
@@ -173,8 +158,7 @@ def _commands(settings: DemoSettings, gains: PidGains, model: Path) -> list[str]
     for node in _nodes(settings, gains, "demo_motion", model, settings.out / "bags" / "by_hand"):
         rest = " ".join(node.command()[3:])
         lines.append(f"fric node {node.name} {rest}")
-    terms = "coulomb,stribeck,asymmetry,viscous,bias,presliding"
     lines.append(
-        f"fric identify {settings.out / 'bags' / 'excitation'} --terms {terms} --method prediction-error --out {settings.out / 'identified'}"
+        f"fric identify {settings.out / 'bags' / 'excitation'} --model {config_file('start_model.yaml')} --method prediction-error --out {settings.out / 'identified'}"
     )
     return lines

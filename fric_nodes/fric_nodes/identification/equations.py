@@ -23,8 +23,8 @@ __all__ = ["Equations", "Stretch", "equations", "surroundings"]
 _FILTER_ORDER = 4
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
 _MIN_ROWS = 20
-_REST_TIME = 0.05  # [s] slower than the limit before it counts as rest
-_REST_ROWS = 3
+_REST_TIME = 0.015  # [s] slower than the limit before it counts as rest
+_REST_ROWS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,10 @@ def equations(records: list[Record], options: Options) -> Equations:
     starts = np.cumsum([0, *(part.shape[0] for part in force[:-1])])
     rest = options.rest_velocity
     if rest is None:
-        rest = 0.02 * float(np.quantile(np.abs(velocity), 0.98))
+        # Below its own noise a velocity says nothing, however slow the rest of the recording is.
+        band = min(cutoff, 0.4 * rate / decimation)
+        noise = max(_velocity_noise(stretch, band) for stretch in stretches)
+        rest = max(0.02 * float(np.quantile(np.abs(velocity), 0.98)), 4.0 * noise)
     resting = [_at_rest(part, rest, decimation / rate) for part in np.split(velocity, starts[1:])]
     sliding = ~np.concatenate(resting)
     rest_time = float(np.sum(~sliding)) * decimation / rate
@@ -142,6 +145,21 @@ def equations(records: list[Record], options: Options) -> Equations:
             f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) don't count for sliding friction"
         )
     return Equations(tuple(stretches), thin, np.concatenate(force), velocity, time, starts, sliding, rest, tuple(notes))
+
+
+def _velocity_noise(stretch: Stretch, band: float) -> float:
+    """Standard deviation [x/s] of the filtered velocity due to noise and steps of the position signal, were it to stand still.
+
+    White noise of s on the position gives s 2 pi band^1.5 sqrt(2/3 sample_time) after filtering to ``band`` [Hz] and differentiation.
+    What the filter took away from the position is noise, and motion too quick for it: the quieter windows hold the noise.
+    """
+    length = max(int(round(0.1 / stretch.sample_time)), 4)
+    away = stretch.raw_position - stretch.position
+    windows = away[: away.shape[0] // length * length].reshape(-1, length)
+    quiet = float(np.sqrt(np.quantile(np.mean(windows**2, axis=1), 0.25)))
+    # Rounding of the position itself, which filters add up over many samples.
+    rounding = 1e-13 * float(np.max(np.abs(stretch.raw_position)))
+    return (quiet + rounding) * 2.0 * np.pi * band**1.5 * float(np.sqrt(2.0 / 3.0 * stretch.sample_time))
 
 
 def _at_rest(velocity: Array, limit: float, row_time: float) -> Mask:

@@ -77,13 +77,19 @@ def minimise(
         _differences(function, point, residual, upper, difference, jacobian)
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
         for _ in range(30):
-            # No parameter loses more than most of its size at once: a scale that has shrunk to nothing has no slope to come back by.
+            step = _bounded_step(normal, gradient, damping, lower - point, upper - point)
+            # No parameter changes by more than most of its size at once: a scale that has shrunk to nothing has no way back.
             reach = _REACH * np.maximum(np.abs(point), _REACH_FROM_ZERO)
-            step = _bounded_step(normal, gradient, damping, np.maximum(lower - point, -reach), np.minimum(upper - point, reach))
+            step /= max(1.0, float(np.max(np.abs(step) / reach)))
             # Decrease of the sum of squares that the linear model promises.
             promised = -float(step @ (2.0 * gradient + normal @ step))
-            if promised <= cost_tolerance * cost or np.all(np.abs(step) <= point_tolerance * (np.abs(point) + point_tolerance)):
+            small = np.all(np.abs(step) <= point_tolerance * (np.abs(point) + point_tolerance))
+            if small or 0.0 <= promised <= cost_tolerance * cost:
                 return Solution(point, residual, jacobian, True, iteration)
+            if promised < 0.0:
+                # A bound has bent the step uphill; a shorter one goes along the gradient.
+                damping, growth = max(damping, 1e-6) * growth, 2.0 * growth
+                continue
             trial = np.clip(point + step, lower, upper)
             trial_residual = function(trial)
             trial_cost = float(trial_residual @ trial_residual)

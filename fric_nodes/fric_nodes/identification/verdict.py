@@ -17,7 +17,7 @@ from .free_parameters import FreeParameters
 
 __all__ = ["Twin", "collinear", "warnings_of"]
 
-_SAME = 1e-3  # part of a column that the others leave over
+_SAME = 0.02  # part of a column that the others leave over: less, and the split between them is made by noise
 _UNSURE = 0.2  # relative standard error
 _CORRELATED = 0.98
 
@@ -44,9 +44,11 @@ def collinear(model: Model, columns: Array, free: FreeParameters, use: Mask) -> 
     twins = []
     # What a model can do without (a parameter with a default) gives way to what it can't.
     optional = [parameter.declaration.default is not None for parameter in model.parameters()]
+    # The shape of these columns is still to be found: what they look like at its start value decides nothing.
+    open_terms = {name.split(".")[0] for name, linear in zip(free.names, free.linear, strict=True) if not linear and "." in name}
     for number in sorted(range(len(free.names)), key=lambda k: optional[int(free.index[k])]):
         name = free.names[number]
-        if not free.linear[number]:
+        if not free.linear[number] or name.split(".")[0] in open_terms:
             continue
         column = columns[use, number]
         size = float(np.linalg.norm(column))

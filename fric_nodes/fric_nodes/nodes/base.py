@@ -95,6 +95,7 @@ def wall_clock() -> tuple[int, int]:
     return time.time_ns(), time.monotonic_ns()
 
 
-def wait_until_sent(publisher: Publisher, seconds: float) -> None:
+def wait_until_sent(node: Node, publisher: Publisher, seconds: float) -> None:
     """Give matched subscribers up to ``seconds`` [s] to receive the last message."""
-    publisher.wait_for_all_acked(Duration(seconds=seconds))
+    if not publisher.wait_for_all_acked(Duration(seconds=seconds)):
+        node.get_logger().warning(f"{publisher.topic_name}: not every subscriber has received the last message")

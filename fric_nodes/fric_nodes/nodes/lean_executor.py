@@ -14,13 +14,14 @@ from threading import RLock
 from typing import Any
 
 from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 __all__ = ["LeanExecutor"]
 
 _EVENTS = 64  # at most so many events of the middleware in one look, so that a storm of them can't hold up the samples
 _HOUSEKEEPING = 0.5  # [s] between looks at what is not in the wait set (event handlers, tasks)
+_SIGNAL_TIME = 0.1  # [s] from a signal to the end of the context
 _BATCH = 256  # messages taken from one subscription before the others get their turn
 
 
@@ -100,7 +101,7 @@ class LeanExecutor(SingleThreadedExecutor):
         for _ in range(2 * (len(self._services) + len(self._clients)) + _EVENTS):
             try:
                 task = self.wait_for_ready_callbacks(timeout_sec=0.0)[0]
-            except TimeoutException:
+            except (TimeoutException, ShutdownException):
                 break
             task()
             task.result()
@@ -115,10 +116,14 @@ class LeanExecutor(SingleThreadedExecutor):
             with self._turning:
                 if not self._is_shutdown:
                     self._turn(timeout_sec)
-        except _rclpy.RCLError:
-            # A signal may end the context between any two calls; that is a shutdown and not a fault.
-            if self._context.ok():
-                raise
+        except RuntimeError:
+            # A signal may end the context between any two calls, or interrupt a message on its way into Python; that is a
+            # shutdown and not a fault. The middleware's own handler may take a moment to say so.
+            deadline = time.monotonic() + _SIGNAL_TIME
+            while self._context.ok():
+                if time.monotonic() > deadline:
+                    raise
+                time.sleep(0.005)
             raise ExternalShutdownException from None
 
     def _turn(self, timeout_sec: Any) -> None:

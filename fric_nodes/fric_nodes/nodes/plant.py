@@ -105,7 +105,7 @@ class PlantNode(LoopNode):
         if self._sample < self._last_sample:
             return False
         if not self.finished.done():
-            wait_until_sent(self._publisher, 1.0)
+            wait_until_sent(self, self._publisher, 5.0)
             self.finish()
         return True
 

@@ -120,8 +120,8 @@ def _curve(outcome: DemoOutcome) -> Section:
     plot = scatter_and_curves(
         None,
         [
-            Curve("true", 1e3 * grid, friction_curve(outcome.truth, grid), "true", "dash", 2.0),
-            Curve("identified", 1e3 * grid, friction_curve(outcome.result.model, grid), "after", width=2.4),
+            Curve("identified", 1e3 * grid, friction_curve(outcome.result.model, grid), "after", width=3.0),
+            Curve("true", 1e3 * grid, friction_curve(outcome.truth, grid), "true", "dash", 1.4),
         ],
         "velocity [mm/s]",
         "friction and bias force [N]",

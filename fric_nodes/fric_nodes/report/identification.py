@@ -24,7 +24,7 @@ def significant(value: float, digits: int = 4) -> str:
     if not np.isfinite(value):
         return "not known"
     if value == 0.0 or 1e-3 <= abs(value) < 1e6:
-        return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
+        return f"{value:#.{digits}g}".rstrip(".") if abs(value) < 10**digits else f"{value:.0f}"
     return f"{value:.{digits - 1}e}"
 
 

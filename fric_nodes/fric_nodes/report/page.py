@@ -14,7 +14,6 @@ import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, select_autoescape
 from plotly.offline import get_plotlyjs
 
-
 __all__ = ["Section", "bullets", "figure", "paragraph", "preformatted", "render", "table", "tiles"]
 
 

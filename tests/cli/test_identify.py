@@ -1,0 +1,150 @@
+"""The command line as a user meets it: real files in, real files out, one line when something is wrong."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+MAP = """
+joint: slide
+time:     {from: t, unit: ms}
+position: {from: x, unit: mm}
+effort:   {from: volts, scale: 2.5, unit: N}
+"""
+MASS, COULOMB, VISCOUS, BIAS = 3.0, 6.0, 25.0, 1.5
+
+
+def fric(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """The command in a process of its own, as a shell would start it."""
+    code = "from fric_nodes.cli.main import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True, timeout=110, check=False
+    )
+
+
+def refusal(*arguments: object) -> str:
+    """The one line with which the command refuses ``arguments``."""
+    done = fric(*arguments)
+    assert done.returncode == 2, done.stderr
+    lines = [line for line in done.stderr.splitlines() if line.startswith("fric:")]
+    assert len(lines) == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    return lines[0]
+
+
+@pytest.fixture(scope="module")
+def csv(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A slide on Coulomb and viscous friction: the motion is given, the force follows from Newton's law written out here."""
+    time = np.arange(0.0, 12.0, 1e-3)
+    w = 2.0 * np.pi * np.array([0.3, 0.7])
+    size = np.array([0.02, 0.008])
+    position = (size * np.sin(np.outer(time, w))).sum(axis=1)
+    velocity = (size * w * np.cos(np.outer(time, w))).sum(axis=1)
+    acceleration = -(size * w**2 * np.sin(np.outer(time, w))).sum(axis=1)
+    force = MASS * acceleration + VISCOUS * velocity + COULOMB * np.sign(velocity) + BIAS
+    force += np.random.default_rng(3).normal(0.0, 0.2, time.shape)
+    path = tmp_path_factory.mktemp("csv") / "run.csv"
+    np.savetxt(path, np.c_[1e3 * time, 1e3 * position, force / 2.5], delimiter=",", header="t,x,volts", comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def bag(csv: Path) -> Path:
+    """The same recording, imported."""
+    mapping = csv.with_name("map.yaml")
+    mapping.write_text(MAP)
+    target = csv.with_name("bag")
+    done = fric("import", csv, "--map", mapping, "--out", target, "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["samples"] == 12000
+    return target
+
+
+def test_identify_finds_the_parameters_and_writes_three_files(bag: Path, tmp_path: Path) -> None:
+    done = fric("identify", bag, "--out", tmp_path / "found", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    truth = {"mass": MASS, "coulomb.force": COULOMB, "viscous.coefficient": VISCOUS, "bias.force": BIAS}
+    for name, value in truth.items():
+        assert found["parameters"][name]["value"] == pytest.approx(value, rel=0.03), name
+        assert 0 < found["parameters"][name]["std"] < 0.05 * value
+    assert found["parameters"]["mass"]["unit"] == "kg"
+    assert found["validation"] is None
+    assert {path.name for path in (tmp_path / "found").iterdir()} == {"model.yaml", "identification.json", "report.html"}
+    page = (tmp_path / "found" / "report.html").read_text()
+    assert "http://" not in page.split("</script>")[-1], "the page must open without a network"
+    shown = fric("model", "show", tmp_path / "found" / "model.yaml", "--json")
+    assert json.loads(shown.stdout)["joint"] == "slide"
+
+
+def test_a_found_model_is_simulated_under_the_recorded_force(bag: Path, tmp_path: Path) -> None:
+    assert fric("identify", bag, "--out", tmp_path / "found").returncode == 0
+    done = fric("simulate", tmp_path / "found" / "model.yaml", "--force", bag, "--out", tmp_path / "free", "--json")
+    assert done.returncode == 0, done.stderr
+    # Within a few percent of the 56 mm of travel after 12 s in open loop.
+    assert json.loads(done.stdout)["position_rmse"] < 0.005
+
+
+def test_validation_is_scored_apart(bag: Path, tmp_path: Path) -> None:
+    done = fric("identify", bag, "--end", "6", "--out", tmp_path, "--json")
+    assert done.returncode == 0, done.stderr
+    line = refusal("identify", bag, "--validate", bag, "--out", tmp_path / "same")
+    assert "both fitted and validated" in line
+    assert not (tmp_path / "same").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("identify", "nowhere.mcap"), "nowhere.mcap"),
+        (("identify", "{bag}", "--joint", "elbow"), "elbow"),
+        (("identify", "{bag}", "--terms", "coulomb,glue"), "glue"),
+        (("identify", "{bag}", "--method", "magic"), "inverse-dynamics"),
+        (("identify", "{bag}", "--cutoff", "900"), "cutoff"),
+        (("identify", "{bag}", "--cutoff", "-1"), "--cutoff"),
+        (("identify", "{bag}", "--hold", "weight"), "weight"),
+        (("identify", "{bag}", "--model", "nowhere.yaml"), "nowhere.yaml"),
+        (("identify", "{bag}", "--topic", "joint_states"), "--topic"),
+        (("model", "show", "nowhere.yaml"), "nowhere.yaml"),
+        (("node", "plants"), "plant, excitation"),
+        (("bench", "coffee"), "recordings"),
+        (("demo", "--clock", "sundial", "--out", "{out}"), "lock-step"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_in_one_line(arguments: tuple[str, ...], says: str, bag: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    filled = [argument.format(bag=bag, out=out) for argument in arguments]
+    if filled[0] == "identify":
+        filled += ["--out", str(out)]
+    assert says in refusal(*filled)
+    assert not out.exists(), "a refused command must leave nothing behind"
+
+
+def test_a_mapping_that_does_not_fit_names_the_columns(csv: Path, tmp_path: Path) -> None:
+    mapping = tmp_path / "map.yaml"
+    mapping.write_text(MAP.replace("volts", "amps"))
+    line = refusal("import", csv, "--map", mapping, "--out", tmp_path / "bag")
+    assert "amps" in line
+    assert "volts" in line
+    assert not (tmp_path / "bag").exists()
+
+
+def test_every_verb_explains_itself_with_an_example() -> None:
+    listed = fric("--help").stdout
+    for verb in ("demo", "node", "import", "record", "play", "simulate", "identify", "model", "bench"):
+        assert verb in listed
+        done = fric(verb, "--help")
+        assert done.returncode == 0
+        assert verb == "model" or "Example:" in done.stdout, verb
+
+
+def test_the_nodes_of_the_command_are_those_that_are_installed() -> None:
+    from fric_nodes.cli.node import NODES
+
+    listed = Path(__file__).parents[2] / "fric_nodes" / "resource" / "executables"
+    assert set(NODES) == set(listed.read_text().split())
