@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-_REASON = "tests on published recordings need the environment variable FRIC_DATA (the folder that holds emps/, tiago_torso/, ...)"
+_REASON = (
+    "tests on published recordings need the environment variable FRIC_DATA (the folder that holds emps/, tiago_torso/, ...)"
+)
 _LEFT_OUT = pytest.StashKey[int]()
 
 

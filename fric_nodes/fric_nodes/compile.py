@@ -13,11 +13,13 @@ temporary folder for this process.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import importlib.util
 import inspect
 import os
 import platform
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -78,7 +80,7 @@ def _loops_for(plant: Plant, effects: tuple[Effect, ...]) -> Loops:
 
 
 def _with_work_space(loop: Callable[..., None], sizes: tuple[int, int]) -> Callable[..., None]:
-    """``loop`` with its last arguments, ``x_next`` and ``z_next``, taken care of; new ones for each call, so that threads don't meet."""
+    """``loop`` with ``x_next`` and ``z_next``, its last arguments, made anew for each call, so that threads don't meet."""
 
     def call(*arguments: object) -> None:
         loop(*arguments, np.empty(sizes[0]), np.empty(sizes[1]))
@@ -164,7 +166,9 @@ def _cache_folder() -> Path:
                 return folder
         except OSError:
             continue
-    return Path(tempfile.mkdtemp(prefix="fric-"))
+    folder = Path(tempfile.mkdtemp(prefix="fric-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def _import(source: str, fingerprint: str) -> ModuleType:

@@ -18,12 +18,15 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
         InputError: the file can't be written.
     """
     target = Path(path)
+    aside: Path | None = None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile("w", dir=target.parent, suffix=".tmp", delete=False, encoding="utf-8") as file:
+            aside = Path(file.name)
             file.write(text)
-        written = Path(file.name)
-        written.chmod(0o644)
-        written.replace(target)
+        aside.chmod(0o644)
+        aside.replace(target)
     except OSError as error:
+        if aside is not None:
+            aside.unlink(missing_ok=True)
         raise InputError(path, f"cannot be written ({error})", "choose a folder that you can write to") from None

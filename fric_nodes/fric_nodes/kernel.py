@@ -1,8 +1,8 @@
 """The decorator of every compiled function, so that all are compiled alike.
 
 Division follows IEEE 754 (no exception inside a step loop) and the arithmetic is strict: the same inputs give the same bits.
-Everything is inlined into the loop that uses it, and nothing allocates or counts references: what a step needs is handed in. With
-the counting, passing an array from function to function costs more than evaluating a friction law.
+Everything is inlined into the loop that uses it, and nothing allocates or counts references: what a step needs is handed in.
+With the counting, passing an array from function to function costs more than evaluating a friction law.
 """
 
 from __future__ import annotations

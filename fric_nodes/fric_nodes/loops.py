@@ -15,8 +15,8 @@ __all__ = ["observe", "predict", "simulate"]
 
 
 def simulate(
-    p: Any, u: Any, h: float, n_sub: int, t_0: float, load: Any, temperature: Any, x: Any, z: Any, x_out: Any, friction_out: Any,
-    x_next: Any, z_next: Any,
+    p: Any, u: Any, h: float, n_sub: int, t_0: float, load: Any, temperature: Any, x: Any, z: Any,
+    x_out: Any, friction_out: Any, x_next: Any, z_next: Any,
 ) -> None:  # fmt: skip
     """Lead the states ``x`` and ``z``, in place, over ``len(u)`` intervals of length ``h`` [s] in ``n_sub`` steps each.
 
@@ -75,9 +75,9 @@ def observe(
 ) -> None:  # fmt: skip
     """Follow the measured positions ``y``: predict each from the state before it, then correct position and velocity.
 
-    ``innovation[k]`` is ``y[k]`` minus its prediction [x], for ``len(u)`` intervals of lengths ``h`` [s]. The correction has the constant gains of an
-    alpha-beta filter. A contact that sticks exactly is left at rest while the innovation stays within three times ``noise`` [x]:
-    the noise of an encoder must not shake it loose.
+    ``innovation[k]`` is ``y[k]`` minus its prediction [x], for ``len(u)`` intervals of lengths ``h`` [s]. The correction has
+    the constant gains of an alpha-beta filter. A contact that sticks exactly is left at rest while the innovation stays within
+    three times ``noise`` [x]: the noise of an encoder must not shake it loose.
     """
     p = unpacked(p)
     t = 0.0

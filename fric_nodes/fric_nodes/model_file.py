@@ -60,7 +60,10 @@ def _field(parameter: Parameter) -> tuple[Any, Any]:
     if parameter.upper < float("inf"):
         bounds["le"] = parameter.upper
     default = ... if parameter.default is None else parameter.default
-    return float, Field(default, description=f"{parameter.symbol} [{parameter.dimension}]: {parameter.doc}", **bounds)
+    # Strict, so that neither a truth value nor a quoted number passes for one; the schema says the same.
+    return float, Field(
+        default, strict=True, description=f"{parameter.symbol} [{parameter.dimension}]: {parameter.doc}", **bounds
+    )
 
 
 @lru_cache(maxsize=1)
@@ -213,7 +216,7 @@ def _line(tree: Any, location: Sequence[str | int]) -> int:
         if not hasattr(tree, "lc"):
             break
         try:
-            at = tree.lc.value(key) if isinstance(key, int) else tree.lc.key(key)
+            at = tree.lc.item(key) if isinstance(key, int) else tree.lc.key(key)
             line = int(at[0]) + 1
             tree = tree[key]
         except (KeyError, IndexError, TypeError, AttributeError):

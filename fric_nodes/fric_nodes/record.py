@@ -21,6 +21,8 @@ __all__ = ["Array", "Mask", "Record", "RecordError", "Units"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+_HOLDS = ("following", "preceding", "linear")
+
 
 class RecordError(InputError):
     """A recording whose content cannot be used."""
@@ -83,6 +85,14 @@ class Record:
                     f"signal '{name}' is not finite at {bad.size} of {n_samples} samples, first at sample {bad[0]}",
                     "drop or repair these samples (--repair)",
                 )
+        if self.valid is not None and self.valid.shape != (n_samples,):
+            raise RecordError(
+                self.source,
+                f"mark 'valid' has shape {self.valid.shape}, time has {self.time.shape}",
+                "give every sample one mark",
+            )
+        if self.effort_hold not in _HOLDS:
+            raise RecordError(self.source, f"effort_hold is '{self.effort_hold}'", f"use one of {', '.join(_HOLDS)}")
         if n_samples < 2:
             raise RecordError(self.source, f"only {max(n_samples, 0)} sample(s)", "record for longer")
         step = np.diff(self.time)

@@ -1,14 +1,13 @@
-"""LuGre pre-sliding: against an implicit integration of the published equations, and against what follows from them on paper."""
+"""LuGre pre-sliding against an implicit integration of the published equations, and against what follows from them on paper."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
-
 from fric_nodes.model import Model, build_model, term
 from fric_nodes.simulate import Predictor, Simulator, simulate, substeps
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 Array = NDArray[np.float64]
 
@@ -16,7 +15,12 @@ COULOMB, SURPLUS, STRIBECK, VISCOUS = 4.0, 2.0, 0.01, 10.0
 
 
 def axis(
-    stiffness: float = 1e5, damping: float = 100.0, mass: float = 1.2, bias: float = 0.0, viscous: float = VISCOUS, forward: float = 0.0
+    stiffness: float = 1e5,
+    damping: float = 100.0,
+    mass: float = 1.2,
+    bias: float = 0.0,
+    viscous: float = VISCOUS,
+    forward: float = 0.0,
 ) -> Model:
     terms = [
         term("coulomb", force=COULOMB),
@@ -30,7 +34,7 @@ def axis(
 
 
 def radau(effort: Array, hold: float, step: float, stiffness: float, damping: float, mass: float) -> tuple[Array, Array]:
-    """Canudas de Wit et al. 1995, Eqs. 1 to 3 with g of Eq. 5, and the body they act on; force constant for ``hold`` seconds each.
+    """Canudas de Wit et al. 1995, Eqs. 1 to 3 with g of Eq. 5, and the body; force constant for ``hold`` seconds each.
 
     Position at every ``step`` and the mean of friction over it, from its impulse as a fourth state.
     """

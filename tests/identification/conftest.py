@@ -1,4 +1,4 @@
-"""An axis to identify, moved by an integrator that shares nothing with fric's: Moreau time stepping in plain Python, 20 steps per sample."""
+"""An axis to identify, moved by an integrator that shares nothing with fric's: Moreau time stepping in plain Python."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-
 from fric_nodes.record import Record
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Truth:
-    """An axis: m dv/dt = u - c v - d |v| - b - friction, friction level F_C + F_D exp(-(v/v_S)^2); bristles when stiffness is given."""
+    """m dv/dt = u - c v - d |v| - b - friction; friction level F_C + F_D exp(-(v/v_S)^2); bristles when stiffness is given."""
 
     mass: float = 2.0
     coulomb: float = 8.0
@@ -29,7 +28,9 @@ class Truth:
     stiffness: float = 0.0
     damping: float = 0.0
 
-    def respond(self, control: Callable[[int, float, float], float], n: int, step: float, fine: int = 20) -> tuple[Array, Array]:
+    def respond(
+        self, control: Callable[[int, float, float], float], n: int, step: float, fine: int = 20
+    ) -> tuple[Array, Array]:
         """Positions and forces at ``n`` samples; the force of a sample acts until the next one."""
         h = step / fine
         q = v = z = 0.0

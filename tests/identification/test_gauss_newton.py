@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fric_nodes.identification.gauss_newton import minimise
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
-
-from fric_nodes.identification.gauss_newton import minimise
 
 Array = NDArray[np.float64]
 FREE = np.full(2, np.inf)

@@ -1,4 +1,4 @@
-"""Inverse dynamics on an axis simulated elsewhere: values, standard errors, and what it must say when a recording can't tell."""
+"""Inverse dynamics on an axis simulated elsewhere: values, standard errors, and what it says when a recording can't tell."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import signal
-
 from fric_nodes.identification import METHODS
 from fric_nodes.identification.result import Identification, IdentificationError, Options
 from fric_nodes.model import Model, Term, build_model, term
 from fric_nodes.record import Record
+from scipy import signal
 
 FIT = METHODS["inverse-dynamics"].fit
 
@@ -81,7 +80,8 @@ def test_ninety_percent_intervals_hold_what_they_promise_under_coloured_noise(sl
 
 def test_estimates_are_unbiased_over_noise(slider: Any) -> None:
     estimates = [
-        [FIT(structure(), [slider.record(noise=0.5, seed=seed)], Options()).model.value(name) for name in TRUE] for seed in range(8)
+        [FIT(structure(), [slider.record(noise=0.5, seed=seed)], Options()).model.value(name) for name in TRUE]
+        for seed in range(8)
     ]
     off = np.abs(np.mean(estimates, axis=0) / np.array(list(TRUE.values())) - 1.0)
     assert np.all(off < [0.01, 0.015, 0.03, 0.15, 0.15]), off

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-
 from fric_nodes.identification.statistics import bartlett_lag, sandwich_covariance
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 START = np.array([0])

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 H = 0.002
 SAMPLES = 600
+FEWER = 200  # for executors that are slow with four nodes
 MODEL = build_model(
     "rigid",
     {"mass": 2.0},
@@ -57,15 +58,15 @@ def _parameters(folder: Path, **plant: object) -> dict[str, dict[str, object]]:
     common = {"lock_step": True, "period": H}
     motion = {f"multisine.{key}": value for key, value in MOTION.items()}
     return {
-        "excitation": {**common, "start_delay": 0.05, "pause": 0.0, "seed": 5, **motion},
-        "compensator": {**common, "model_file": str(file)},
-        "pid": {**common, **GAINS, "force_limit": 50.0},
+        "excitation": {**common, "start_delay": 0.05, "pause": 0.0, "seed": 5, "wait_for_subscribers": 3, **motion},
+        "compensator": {**common, "model_file": str(file), "wait_for_subscribers": 2},
+        "pid": {**common, **GAINS, "force_limit": 50.0, "wait_for_subscribers": 2},
         "plant": {**common, "model_file": str(file), "resolution": 1e-6, "force_noise": 0.2, "force_limit": 50.0, "seed": 3,
-                  "duration": SAMPLES * H, **plant},
+                  "duration": SAMPLES * H, "wait_for_subscribers": 3, **plant},
     }  # fmt: skip
 
 
-def _expected(n_samples: int = SAMPLES) -> dict[str, np.ndarray]:
+def _expected(n_samples: int) -> dict[str, np.ndarray]:
     """The loop by the core alone: what each topic must carry at sample k."""
     kind = EXCITATIONS["multisine"]
     values: dict[str, Any] = {p.name: p.default for p in kind.parameters}
@@ -120,7 +121,7 @@ class Listener:
         return np.array([field(deserialize_message(found[k], TYPES[topic])) for k in sorted(found)])
 
 
-def _check_against_core(listener: Listener) -> None:
+def _check_against_core(listener: Listener, n_samples: int = SAMPLES) -> None:
     graph_says = {
         "position": listener.values("joint_states", lambda m: m.position[0]),
         "effort": listener.values("joint_states", lambda m: m.effort[0]),
@@ -128,8 +129,8 @@ def _check_against_core(listener: Listener) -> None:
         "feedforward": listener.values("feedforward_force", lambda m: m.force),
         "command": listener.values("force_command", lambda m: m.force),
     }
-    for name, expected in _expected().items():
-        assert np.abs(graph_says[name][:SAMPLES] - expected).max() <= 1e-9 * np.abs(expected).max(), name
+    for name, expected in _expected(n_samples).items():
+        assert np.abs(graph_says[name][:n_samples] - expected).max() <= 1e-9 * np.abs(expected).max(), name
 
 
 def _wait_for_end(graph: Graph, plant: Any, listener: Listener) -> str:
@@ -173,7 +174,7 @@ def test_four_processes_repeat_themselves_byte_for_byte_and_survive_a_kill(graph
 @pytest.mark.parametrize("kind", [SingleThreadedExecutor, MultiThreadedExecutor, LeanExecutor])
 @pytest.mark.parametrize("look_ahead", [0, 16])
 def test_all_in_one_process_under_every_executor(graph: Graph, kind: type[Executor], look_ahead: int) -> None:
-    parameters = _parameters(graph.folder)
+    parameters = _parameters(graph.folder, duration=FEWER * H)
     parameters["excitation"]["look_ahead"] = look_ahead
     listener = Listener(graph)
     context = graph.context()
@@ -183,12 +184,13 @@ def test_all_in_one_process_under_every_executor(graph: Graph, kind: type[Execut
         nodes[name] = graph.owns(make(context=context, parameter_overrides=overrides))
     graph.spin(*nodes.values(), kind=kind)
     graph.until(nodes["plant"].finished.done, "the plant ends")
-    graph.until(lambda: listener.sample() >= SAMPLES, "the last state arrives")
-    _check_against_core(listener)
+    graph.until(lambda: listener.sample() >= FEWER, "the last state arrives")
+    _check_against_core(listener, FEWER)
 
 
 def test_plant_refuses_and_counts_commands_that_are_not_finite(graph: Graph) -> None:
-    overrides = [Parameter(key, value=value) for key, value in _parameters(graph.folder)["plant"].items()]
+    parameters = _parameters(graph.folder, wait_for_subscribers=1)["plant"]
+    overrides = [Parameter(key, value=value) for key, value in parameters.items()]
     plant = graph.owns(PlantNode(context=graph.context(), parameter_overrides=overrides))
     listener = Listener(graph)
     graph.spin(plant)
@@ -207,7 +209,8 @@ def test_two_axes_under_their_namespaces_do_not_meet(graph: Graph) -> None:
     plants = []
     context = graph.context()
     for name in ("left", "right"):
-        overrides = [Parameter(key, value=value) for key, value in _parameters(graph.folder)["plant"].items()]
+        parameters = _parameters(graph.folder, wait_for_subscribers=0)["plant"]
+        overrides = [Parameter(key, value=value) for key, value in parameters.items()]
         plants.append(graph.owns(PlantNode(context=context, namespace=name, parameter_overrides=overrides)))
     graph.spin(*plants)
     tester = graph.node("tester")

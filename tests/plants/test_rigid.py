@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
-
 from fric_nodes.model import Model, build_model, term
 from fric_nodes.simulate import Predictor, Simulator, simulate
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 Array = NDArray[np.float64]
 
@@ -34,7 +33,9 @@ def axis(
     return build_model("rigid", {"mass": mass}, terms)
 
 
-def run(model: Model, effort: Array, step: float, q: float = 0.0, v: float = 0.0, n_substeps: int | None = 1) -> tuple[Array, Array, Array]:
+def run(
+    model: Model, effort: Array, step: float, q: float = 0.0, v: float = 0.0, n_substeps: int | None = 1
+) -> tuple[Array, Array, Array]:
     """Position, velocity at all n + 1 instants and friction over all n intervals."""
     states, friction = Simulator(model, q, v).run(effort, step, n_substeps)
     return np.r_[q, states[:, 0]], np.r_[v, states[:, 1]], friction
@@ -192,7 +193,7 @@ def test_the_balance_of_energy_closes_in_every_step_of_a_curved_law() -> None:
 
 
 def _event_driven(duration: float, force: float, frequency: float) -> tuple[Array, Array]:
-    """Slide and stick phases of m=1.2, F_C=4, surplus 2 at 0.01 m/s, c=10 under a sine, each ended by an event; on a 10 ms grid."""
+    """Slide and stick phases under a sine, each ended by an event: m=1.2, F_C=4, surplus 2 at 0.01 m/s, c=10; 10 ms grid."""
     mass, level, surplus, v_s, viscous = 1.2, 4.0, 2.0, 0.01, 10.0
     grid = np.arange(0.0, duration + 5e-3, 0.01)
     position = np.zeros_like(grid)
@@ -228,7 +229,15 @@ def _event_driven(duration: float, force: float, frequency: float) -> tuple[Arra
         stopped.direction = -1  # type: ignore[attr-defined]
         inside = grid[(grid > start) & (grid <= duration)]
         answer = solve_ivp(
-            slide, (start, duration), [q, s * 1e-12], method="DOP853", rtol=1e-12, atol=1e-14, events=stopped, t_eval=inside, max_step=1e-3
+            slide,
+            (start, duration),
+            [q, s * 1e-12],
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+            events=stopped,
+            t_eval=inside,
+            max_step=1e-3,
         )
         position[np.isin(grid, answer.t)] = answer.y[0]
         if not answer.t_events[0].size:
@@ -260,7 +269,9 @@ def test_the_predictor_asks_for_the_force_that_the_simulator_was_given() -> None
     t = 1e-3 * (np.arange(5000) + 0.5)
     effort = 14.0 * np.sin(2 * np.pi * 0.7 * t)
     q, v, friction = run(model, effort, 1e-3)
-    effort_wanted, friction_wanted = Predictor(model).run(t, 0.5 * (q[1:] + q[:-1]), 0.5 * (v[1:] + v[:-1]), np.diff(v) / 1e-3, 1e-3)
+    effort_wanted, friction_wanted = Predictor(model).run(
+        t, 0.5 * (q[1:] + q[:-1]), 0.5 * (v[1:] + v[:-1]), np.diff(v) / 1e-3, 1e-3
+    )
     sliding = v[1:] * v[:-1] > 0
     np.testing.assert_allclose(effort_wanted[sliding], effort[sliding], atol=1e-5 * 14.0)
     np.testing.assert_allclose(friction_wanted[sliding], friction[sliding], atol=1e-5 * 14.0)

@@ -92,10 +92,7 @@ class Graph:
         self._logs.mkdir(parents=True, exist_ok=True)
         try:
             for node in self._nodes:
-                with (self._logs / f"{node.name}.log").open("wb") as log:
-                    self._children[node.name] = subprocess.Popen(
-                        node.command(), stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, env=self._environment
-                    )
+                self.start(node)
         except BaseException:
             self._kill()
             raise
@@ -105,6 +102,28 @@ class Graph:
         if kind is None:
             self.stop()
         self._kill()
+
+    def start(self, node: NodeSetup) -> None:
+        """Start one more node."""
+        with (self._logs / f"{node.name}.log").open("wb") as log:
+            self._children[node.name] = subprocess.Popen(
+                node.command(), stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, env=self._environment
+            )
+
+    def wait_for_text(self, name: str, text: str, timeout: float) -> None:
+        """Wait until the node ``name`` has printed ``text``.
+
+        Raises:
+            GraphError: a node failed, or ``timeout`` [s] passed.
+        """
+        end = time.monotonic() + timeout
+        while text not in self.text_of(name):
+            self.check()
+            if time.monotonic() > end:
+                raise GraphError(
+                    name, f"did not come to '{text}' within {timeout:.0f} s", f"its last words: {self._last_words(name)}"
+                )
+            time.sleep(0.02)
 
     def wait_for(self, name: str, timeout: float) -> None:
         """Wait until the node ``name`` ends by itself.

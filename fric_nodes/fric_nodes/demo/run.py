@@ -29,8 +29,12 @@ __all__ = ["DemoSettings", "run_demo"]
 
 _FILTER_TIME = 5e-4  # [s] of the PID's derivative
 _MOTIONS = {"excitation": 44.5, "demo_motion": 21.5}  # parameter file of the motion: time of the axis until it has ended [s]
-# In wall time a command acts about one period after the measurement that it answers.
-_DELAY_PERIODS = {"lock-step": 0.0, "wall": 1.0}
+# Who takes joint_states, so that the recorder doesn't miss the beginning: PID, recorder, and in lock-step the excitation.
+_LISTENERS = {"lock-step": 3, "wall": 2}
+_START_TIME = 5.0  # [s] that a node may take to start
+_PRIORITY = 20  # of the loop in wall time, where the system grants real-time priority
+# In wall time a command acts about half a period, 1 ms, after the measurement that it answers.
+_DELAY_PERIODS = {"lock-step": 0.0, "wall": 0.5}
 
 
 @dataclass(frozen=True)
@@ -58,9 +62,16 @@ def identify(bag: Path) -> Identification:
     return METHODS["prediction-error"].fit(read_model(config_file("start_model.yaml")), [record], Options())
 
 
+def _duration(settings: DemoSettings, motion: str) -> float:
+    """Time of the axis that covers the motion [s]; in wall time it begins a while after the axis has."""
+    return _MOTIONS[motion] + (_START_TIME if settings.clock == "wall" else 0.0)
+
+
 def _nodes(settings: DemoSettings, gains: PidGains, motion: str, model: Path | None, bag: Path) -> list[NodeSetup]:
     """The five nodes of one run, in the order in which they are started."""
     loop: dict[str, object] = {"period": 1.0 / settings.rate, "lock_step": settings.clock == "lock-step"}
+    if settings.clock == "wall":
+        loop["realtime_priority"] = _PRIORITY
     compensator = loop | {"enabled": model is not None} | ({} if model is None else {"model_file": model})
     pid = loop | {
         "kp": gains.proportional,
@@ -68,21 +79,27 @@ def _nodes(settings: DemoSettings, gains: PidGains, motion: str, model: Path | N
         "kd": gains.derivative,
         "filter_time": gains.filter_time,
     }
-    plant = loop | {"seed": settings.seed, "duration": _MOTIONS[motion]}
+    plant = loop | {"seed": settings.seed, "duration": _duration(settings, motion), "wait_for_subscribers": _LISTENERS[settings.clock]}
     recorder = {"bag": bag, "log_time": "stamp" if settings.clock == "lock-step" else "receive"}
+    excitation = loop | {"seed": settings.seed, "wait_for_subscribers": 3}
     return [
         NodeSetup("recorder", recorder),
-        NodeSetup("excitation", loop | {"seed": settings.seed}, config_file(f"{motion}.yaml")),
         NodeSetup("compensator", compensator, config_file("compensator.yaml")),
         NodeSetup("pid", pid, config_file("pid.yaml")),
         NodeSetup("plant", plant, config_file("plant.yaml")),
+        NodeSetup("excitation", excitation, config_file(f"{motion}.yaml")),
     ]
 
 
 def _run(settings: DemoSettings, gains: PidGains, motion: str, model: Path | None, name: str) -> tuple[Run, float | None]:
     """One recorded run of the graph, and the lock-step rate that the plant reports."""
     bag = settings.out / "bags" / name
-    with Graph(_nodes(settings, gains, motion, model, bag), settings.out / "logs" / name, free_domain()) as graph:
+    *others, excitation = _nodes(settings, gains, motion, model, bag)
+    with Graph(others, settings.out / "logs" / name, free_domain()) as graph:
+        if settings.clock == "wall":
+            # The motion must not begin before there is an axis to follow it.
+            graph.wait_for_text("plant", "started", timeout=60.0)
+        graph.start(excitation)
         graph.wait_for("plant", timeout=60.0 + 10.0 * _MOTIONS[motion])
         graph.stop()
         words = graph.text_of("plant")

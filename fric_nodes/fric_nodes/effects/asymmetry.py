@@ -48,6 +48,6 @@ EFFECT = Effect(
     force=force,
     regime="one direction of motion against the other, at the same speed",
     looks_like={
-        "bias": "push the resting body from both sides: a bias shifts both break-away forces alike, asymmetric friction doesn't push"
+        "bias": "push the resting body from both sides: a bias shifts both break-away forces alike, an asymmetry doesn't push"
     },
 )

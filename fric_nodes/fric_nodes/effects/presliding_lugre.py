@@ -2,8 +2,8 @@
 
 Equation: F = sigma_0 z + sigma_1 dz/dt, dz/dt = v - sigma_0 |v| / g(v) z, where g is the slip level of the other terms
 (Coulomb, Stribeck, ...), so that steady sliding gives back exactly that level.
-Source: Canudas de Wit, Olsson, Astrom, Lischinsky 1995; Amthor et al. 2008, Eqs. 2 to 4 (whose Eq. 4 prints the exponent without
-its v_S; the viscous term sigma_2 v is the effect ``viscous``).
+Source: Canudas de Wit, Olsson, Astrom, Lischinsky 1995; Amthor et al. 2008, Eqs. 2 to 4 (whose Eq. 4 prints the exponent
+without its v_S; the viscous term sigma_2 v is the effect ``viscous``).
 
 The step is exact for constant velocity: with r = sigma_0 |v| h / g and z_s = g sgn(v) / sigma_0,
 z(h) = z_s + (z(0) - z_s) exp(-r), and its mean over the step is z_s + (z(0) - z_s) (1 - exp(-r)) / r. It therefore neither

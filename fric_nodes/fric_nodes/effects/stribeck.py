@@ -29,7 +29,7 @@ def level(c: Context, base: float, force: float, velocity: float, exponent: floa
         fall = ratio
     else:
         fall = ratio**exponent
-    # An exponential that underflows takes ten times as long as any other, and what is left of the surplus is beyond all precision.
+    # An exponential that underflows takes ten times as long as any other, and what is left there is beyond all precision.
     if fall > _FALLEN:
         return base
     return base + force * math.exp(-fall)

@@ -150,10 +150,11 @@ def equations(records: list[Record], options: Options) -> Equations:
 def _velocity_noise(stretch: Stretch, band: float) -> float:
     """Standard deviation [x/s] of the filtered velocity due to noise and steps of the position signal, were it to stand still.
 
-    White noise of s on the position gives s 2 pi band^1.5 sqrt(2/3 sample_time) after filtering to ``band`` [Hz] and differentiation.
-    What the filter took away from the position is noise, and motion too quick for it: the quieter windows hold the noise.
+    White noise of s on the position gives s 2 pi band^1.5 sqrt(2/3 sample_time) after filtering to ``band`` [Hz] and
+    differentiation. What the filter took away from the position is noise, and motion too quick for it: the quieter windows hold
+    the noise.
     """
-    length = max(int(round(0.1 / stretch.sample_time)), 4)
+    length = max(round(0.1 / stretch.sample_time), 4)
     away = stretch.raw_position - stretch.position
     windows = away[: away.shape[0] // length * length].reshape(-1, length)
     quiet = float(np.sqrt(np.quantile(np.mean(windows**2, axis=1), 0.25)))

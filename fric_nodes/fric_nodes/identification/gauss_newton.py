@@ -4,9 +4,9 @@ Gauss-Newton steps with Levenberg-Marquardt damping on the normal equations, col
 
     (A + mu D) d = -g,   A = J'J,  g = J'r,  D = diag(A),   lower <= x + d <= upper,
 
-bounds by an active set: a component that would leave is put on its bound and the rest solved again. The damping follows the ratio of
-actual to predicted decrease (Nielsen 1999). Only sums over the residuals are kept of a Jacobian, so that an iteration costs its
-n_parameters + 1 evaluations and little else; a decomposition of the whole Jacobian costs more than the simulations that it comes from.
+bounds by an active set: a component that would leave is put on its bound and the rest solved again. The damping follows the
+ratio of actual to predicted decrease (Nielsen 1999). A step needs only sums over the residuals, so that an iteration costs its
+n_parameters + 1 evaluations and little else; decomposing the whole Jacobian costs more than the simulations that it comes from.
 Source: Madsen, Nielsen, Tingleff 2004, section 3.2; the active set is that of Bertsekas 1982 for simple bounds.
 """
 

@@ -6,9 +6,10 @@ therefore differ by their weighting in time and by nothing else; the price is a 
 
 Forgetting is directional (Cao and Schwartz 2000): with information matrix R and regressor phi
 
-    R <- R - (1 - lambda) R phi phi' R / (phi' R phi) + phi phi',
+    R <- R - n (1 - lambda) R phi phi' R / (phi' R phi) + phi phi',
 
-so that old information fades only along directions in which new information comes in. A parameter that the motion does not
+so that old information fades only along directions in which new information comes in. A row takes one of n directions, so it
+forgets n-fold there, and the whole fades by lambda per row on average. A parameter that the motion does not
 excite keeps its value and its standard error, however long the axis rests or repeats itself: no wind-up, no drift.
 
 The covariance is the sandwich R^-1 S R^-1, with S the forgetting sum of score products over blocks of time: correlated
@@ -19,7 +20,7 @@ white-noise formula widened by the residuals' first autocorrelation stands in.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -35,6 +36,8 @@ __all__ = ["Estimate", "OnlineIdentifier", "State"]
 
 _BLOCK_TIME = 0.5  # [s]
 _MIN_BLOCKS_PER_PARAMETER = 3
+_MOST_FORGOTTEN = 0.9  # of the information along one row, by that row
+_REST = 0.02  # of the fastest motion so far
 
 
 class State(IntEnum):
@@ -101,6 +104,7 @@ class OnlineIdentifier:
         self._n_blocks = 0.0
         self._energy = self._lagged_energy = self._weight = 0.0
         self._last_residual = 0.0
+        self._fastest = 0.0
         self.samples_used = 0
         self.samples_rejected = 0
         self._clear_buffer()
@@ -164,7 +168,7 @@ class OnlineIdentifier:
             return False
         try:
             record = Record(time - time[0], np.array(self._position), np.array(self._effort), source="joint states")
-            found = equations([record], self.options)
+            found = self._equations(record)
         except (RecordError, IdentificationError):
             self._clear_buffer()
             return False
@@ -178,6 +182,15 @@ class OnlineIdentifier:
         for samples in (self._time, self._position, self._effort):
             del samples[:keep_from]
         return learnt
+
+    def _equations(self, record: Record) -> Equations:
+        """The block's equations, with rest measured by the fastest motion so far, of which a block knows only its part."""
+        found = equations([record], self.options)
+        if self.options.rest_velocity is not None:
+            return found
+        self._fastest = max(self._fastest, float(np.quantile(np.abs(found.velocity), 0.98)))
+        rest = _REST * self._fastest
+        return found if rest <= found.rest_velocity else equations([record], replace(self.options, rest_velocity=rest))
 
     def _learn(self, found: Equations) -> bool:
         columns = regressors(self.structure, found)
@@ -199,6 +212,8 @@ class OnlineIdentifier:
             fade = forgetting**n_learnt
             self._scores = fade * self._scores + np.outer(score, score)
             self._n_blocks = fade * self._n_blocks + 1.0
+            # As old information does, so that one wild block doesn't make everything else a rest.
+            self._fastest *= fade
         return n_learnt > 0
 
     def _update(self, phi: Array, force: float, forgetting: float) -> float:
@@ -207,7 +222,8 @@ class OnlineIdentifier:
         image = self._information @ phi
         along = float(phi @ image)
         if along > 0.0:
-            self._information -= (1.0 - forgetting) / along * np.outer(image, image)
+            share = min(phi.shape[0] * (1.0 - forgetting), _MOST_FORGOTTEN)
+            self._information -= share / along * np.outer(image, image)
         self._information += np.outer(phi, phi)
         # Scaled, since the columns differ by orders of magnitude; the pseudo-inverse leaves directions without information
         # alone.

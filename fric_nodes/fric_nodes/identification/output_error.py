@@ -62,8 +62,9 @@ def _errors(model: Model, runs: Sequence[_Run], n_substeps: int) -> Array:
             if leader is None or leader[0] is not s:
                 leader = (s, Predictor(model))
             simulator.friction_state[:] = leader[1].friction_state
-            led = (s.time, s.position, s.velocity, s.acceleration)
-            leader[1].run(*(_part(signal, run) for signal in led), s.sample_time, _part(s.load, run), _part(s.temperature, run))
+            q, v, a = (_part(signal, run) for signal in (s.position, s.velocity, s.acceleration))
+            load, temperature = _part(s.load, run), _part(s.temperature, run)
+            leader[1].run(_part(s.time, run), q, v, a, s.sample_time, load, temperature)
         effort = intervals(s.effort[part], s.hold)
         states, _ = simulator.run(effort, s.sample_time, n_substeps, _part(s.load, run), _part(s.temperature, run))
         errors.append(states[:, 0] - s.raw_position[part][1:])
@@ -102,7 +103,8 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     model = start.with_values(values, inverse_dynamics.standard_errors(free, covariance))
     warnings, status = warnings_of(model, free, covariance)
     if not answer.converged:
-        status = f"not converged after {answer.iterations} steps; start nearer to the machine's values (--model), or shorten the runs (--horizon)"
+        remedy = "start nearer to the machine's values (--model), or shorten the runs (--horizon)"
+        status = f"not converged after {answer.iterations} steps; {remedy}"
     return Identification(
         model=model,
         fitted=free.names,

@@ -45,7 +45,7 @@ def collinear(model: Model, columns: Array, free: FreeParameters, use: Mask) -> 
     # What a model can do without (a parameter with a default) gives way to what it can't.
     optional = [parameter.declaration.default is not None for parameter in model.parameters()]
     # The shape of these columns is still to be found: what they look like at its start value decides nothing.
-    open_terms = {name.split(".")[0] for name, linear in zip(free.names, free.linear, strict=True) if not linear and "." in name}
+    open_terms = {name.split(".")[0] for name in free.only(False).names if "." in name}
     for number in sorted(range(len(free.names)), key=lambda k: optional[int(free.index[k])]):
         name = free.names[number]
         if not free.linear[number] or name.split(".")[0] in open_terms:

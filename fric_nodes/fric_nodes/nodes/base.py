@@ -13,7 +13,8 @@ from rclpy.publisher import Publisher
 from rclpy.task import Future
 
 from .parameters import NodeParameter, Settings
-from .scheduling import settle_memory, use_realtime_scheduling
+from .realtime import raise_priority
+from .scheduling import use_realtime_scheduling
 from .timing import Deadlines, Reporter
 
 __all__ = ["COMMON", "LOCK_STEP", "PERIOD", "LoopNode", "wait_until_sent", "wall_clock"]
@@ -25,6 +26,8 @@ COMMON = (
     NodeParameter(
         "realtime_priority", 0, "wall time: SCHED_FIFO priority to ask the system for; 0: normal scheduling", "", 0, 99
     ),
+    NodeParameter("wait_for_subscribers", 1, "lock-step, excitation: publish samples only when so many listen", "", 0, 100),
+    NodeParameter("realtime_priority", 0, "SCHED_FIFO priority of the node's threads; 0: none", "", 0, 99),
     NodeParameter("diagnostics_period", 1.0, "time between two reports on /diagnostics", "s", 0.01, 3600.0),
 )
 
@@ -57,13 +60,17 @@ class LoopNode(Node):
         self.deadlines = Deadlines(0.0 if self.lock_step else self.period)
         self.finished: Future = Future()
         self._scheduling = "normal"
+        self._heard = False
+        if priority := self.settings.integer("realtime_priority"):
+            refused = raise_priority(priority)
+            if refused is not None:
+                self.get_logger().warning(f"no real-time priority: {refused}")
         self._reporter = Reporter(
             self, self.settings.number("diagnostics_period"), self.deadlines, self.counters, self._all_conditions
         )
 
     def settle(self) -> None:
         """Called once before the loop starts, by a process that the node has for itself."""
-        settle_memory()
         priority = self.settings.integer("realtime_priority")
         if priority > 0 and not self.lock_step:
             self._scheduling = use_realtime_scheduling(priority)
@@ -75,6 +82,12 @@ class LoopNode(Node):
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report; overridden where there is something."""
         return {}
+
+    def has_audience(self, publisher: Publisher) -> bool:
+        """True once as many nodes as asked for listen to ``publisher``, and from then on."""
+        if not self._heard:
+            self._heard = bool(publisher.get_subscription_count() >= self.settings.integer("wait_for_subscribers"))
+        return self._heard
 
     def refuse(self, what: str, why: object) -> None:
         """Count an input that can't be used, and say so at most once a second."""

@@ -73,7 +73,7 @@ class CompensatorNode(LoopNode):
         given = self.settings.number("preview")
         # The middle of the interval in which the command acts. In wall time the reference is half a period old on average when
         # a joint state meets it, and the messages take a while.
-        return given if given >= 0.0 else (0.5 if self.lock_step else 1.2) * self.period
+        return given if given >= 0.0 else (0.5 if self.lock_step else 1.75) * self.period
 
     def _on_settings(self, _changed: set[str]) -> None:
         self._feedforward.enabled = self.settings.flag("enabled")
@@ -131,6 +131,8 @@ class CompensatorNode(LoopNode):
         self.deadlines.latency((time.time_ns() - stamp) * 1e-9)
 
     def _on_step(self, reference: ReferencePoint) -> None:
+        if not self.has_audience(self._forces.publisher):
+            return  # it will be sent again
         stamp = reference.stamp
         force = self._answers.find(stamp, reference)
         if force is None:

@@ -29,7 +29,6 @@ PARAMETERS = (
     LOCK_STEP,
     NodeParameter("kinds", ["multisine"], "excitations to go through, in this order", choices=tuple(EXCITATIONS)),
     NodeParameter("seed", 0, "of what is random in them", "", 0, 2**31 - 1),
-    NodeParameter("wait_for_subscribers", 1, "wall time: start when so many nodes listen", "", 0, 100),
     NodeParameter("start_delay", 1.0, "rest before the first", "s", 0.0, 1e6),
     NodeParameter("pause", 0.5, "rest after each", "s", 0.0, 1e6),
     NodeParameter("repeat", False, "go through them again and again"),
@@ -65,6 +64,7 @@ class ExcitationNode(LoopNode):
             self._reference = Reference()
             self._reference.header.frame_id = self.joint
             self._references = self.create_publisher(Reference, "reference", SAMPLES)
+        self._publisher = self._references if self._forces is None else self._forces.publisher
         self.get_logger().info(f"{', '.join(settings.texts('kinds'))}: {self._plan.duration:.1f} s")
         if self.lock_step:
             self._period_ns = from_seconds(self.period)
@@ -76,7 +76,6 @@ class ExcitationNode(LoopNode):
         else:
             self._epoch, self._origin = wall_clock()
             self._start: int | None = None
-            self._listeners = settings.integer("wait_for_subscribers")
             self.create_timer(self.period, self._tick)
 
     def condition(self) -> Mapping[str, str]:
@@ -92,13 +91,11 @@ class ExcitationNode(LoopNode):
         message.position, message.velocity, message.acceleration = position, velocity, acceleration
         self._references.publish(message)
 
-    def _present(self) -> int:
-        """Number of nodes that listen."""
-        return self._references.get_subscription_count() if self._forces is None else self._forces.listeners()
-
     # Lock-step
 
     def _on_state(self, state: JointState) -> None:
+        if not self.has_audience(self._publisher):
+            return  # the plant will ask again
         sample = nanoseconds(state.header.stamp) // self._period_ns
         if sample <= self._seen:
             # The plant repeats itself, or has started again: someone has missed what was sent from here on.
@@ -127,7 +124,7 @@ class ExcitationNode(LoopNode):
         now = time.monotonic_ns()
         if self._start is None:
             # The motion starts when somebody is there to follow it, and not before.
-            if self._present() < self._listeners:
+            if not self.has_audience(self._publisher):
                 return
             self._start = now
         position, velocity, acceleration = self._plan.at(np.array([(now - self._start) * 1e-9]))

@@ -62,13 +62,17 @@ def force_type(node: LoopNode) -> Any:
 
 
 class ForcePublisher:
-    """Publishes forces of ``node`` on ``topic``, in the type that it is told to use."""
+    """Publishes forces of ``node`` on ``topic``, in the type that it is told to use.
+
+    Attributes:
+        publisher: the publisher itself.
+    """
 
     def __init__(self, node: LoopNode, topic: str) -> None:
         self._message = force_type(node)()
         if isinstance(self._message, StampedForce):
             self._message.header.frame_id = node.joint
-        self._publisher = node.create_publisher(type(self._message), topic, SAMPLES)
+        self.publisher = node.create_publisher(type(self._message), topic, SAMPLES)
 
     def publish(self, stamp: int, force: float) -> None:
         """Publish ``force`` [F] for the sample ``stamp`` [ns]."""
@@ -78,12 +82,8 @@ class ForcePublisher:
         else:
             set_stamp(message.header.stamp, stamp)
             message.force = force
-        self._publisher.publish(message)
+        self.publisher.publish(message)
 
     def repeat(self) -> None:
         """Publish the last one again."""
-        self._publisher.publish(self._message)
-
-    def listeners(self) -> int:
-        """Number of subscriptions."""
-        return int(self._publisher.get_subscription_count())
+        self.publisher.publish(self._message)

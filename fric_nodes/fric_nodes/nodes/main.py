@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import time
 from collections.abc import Callable
 
 import rclpy
@@ -34,13 +35,15 @@ def run(make: Callable[[], LoopNode], args: list[str] | None = None) -> None:
             gc.collect()
             gc.freeze()
             executor.spin_until_future_complete(node.finished)
+        except (KeyboardInterrupt, ExternalShutdownException):
+            _let_the_signal_pass()
         finally:
             executor.shutdown()
             if node is not None:
                 node.close()
                 node.destroy_node()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    except KeyboardInterrupt:
+        _let_the_signal_pass()  # before the node was there
     except InputError as error:
         refusal = error
     finally:
@@ -48,3 +51,11 @@ def run(make: Callable[[], LoopNode], args: list[str] | None = None) -> None:
     if refusal is not None:
         sys.stderr.write(f"{refusal}\n")
         sys.exit(2)
+
+
+def _let_the_signal_pass() -> None:
+    """Wait until the middleware has dealt with the signal: its own thread still wakes what is about to be destroyed."""
+    deadline = time.monotonic() + 0.5
+    while rclpy.ok() and time.monotonic() < deadline:
+        time.sleep(0.002)
+    time.sleep(0.01)

@@ -137,7 +137,7 @@ class PidNode(LoopNode):
     def _answer(self) -> None:
         """Publish the command to the pending state, when all that it takes is there."""
         state = self._pending
-        if state is None:
+        if state is None or not self.has_audience(self._commands.publisher):
             return
         reference = self._references.get(state.stamp)
         feedforward = self._forces.get(state.stamp) if self._adds else 0.0

@@ -42,6 +42,7 @@ PARAMETERS = (
     NodeParameter("watchdog_time", 0.1, "wall time: without a command for so long the force is zero", "s", 1e-3, 1e6),
     NodeParameter("retry_time", 0.2, "lock-step: repeat the state when no command has come for so long", "s", 1e-2, 1e3),
     NodeParameter("duration", 0.0, "end after so much time of the axis; 0: endless", "s", 0.0, 1e9),
+    NodeParameter("wait_for_subscribers", 0, "publish the first sample when joint_states has so many subscribers", "", 0, 100),
     STAMPED,
 )
 
@@ -73,6 +74,7 @@ class PlantNode(LoopNode):
         self._state = JointState(name=[self.joint], position=[0.0])
         self._state.header.frame_id = self.joint
         self._publisher = self.create_publisher(JointState, "joint_states", SAMPLES)
+        self._audience = settings.integer("wait_for_subscribers")
         self.create_subscription(force_type(self), "force_command", self._on_command, SAMPLES)
         if self.lock_step:
             self._period_ns = from_seconds(self.period)
@@ -88,6 +90,10 @@ class PlantNode(LoopNode):
             self._watchdog = from_seconds(settings.number("watchdog_time"))
             self._fed = False
             self.create_timer(self.period, self._tick)
+
+    def _waiting(self) -> bool:
+        """True while those who must not miss the first sample are not all there."""
+        return self._sample == 0 and self._publisher.get_subscription_count() < self._audience
 
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report."""
@@ -126,6 +132,12 @@ class PlantNode(LoopNode):
 
     def _on_step(self, stamp: int, command: float) -> None:
         self._commands.put(stamp, command)
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Advance as far as there are commands."""
+        if self._waiting():
+            return
         while (force := self._commands.get(self._sample * self._period_ns)) is not None:
             if self._sample >= self._last_sample:
                 return
@@ -143,6 +155,9 @@ class PlantNode(LoopNode):
             self._end_if_due()
 
     def _retry(self) -> None:
+        if not self.has_audience(self._publisher):
+            return
+        self._go_on()
         if self._sample == self._seen:
             self.counters["repeated states"] += 1
             self._publisher.publish(self._state)
@@ -168,6 +183,10 @@ class PlantNode(LoopNode):
             return
         now = time.monotonic_ns()
         self._advance_to(now)
+        if self._waiting():
+            return
+        if self._sample == 0:
+            self.get_logger().info("started")
         self._sample += 1
         self._measure(self._epoch + now - self._origin)
         self._publisher.publish(self._state)

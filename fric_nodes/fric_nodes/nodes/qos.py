@@ -1,7 +1,7 @@
 """Quality of service of every topic, in one place.
 
-Samples are reliable and kept in a queue that holds far more than a node can be behind: in lock-step a lost message costs a
-retransmission, and a recorder wants all of them. A model is kept for whoever comes later.
+Samples are reliable and kept in a queue that holds far more than a node can be behind: in lock-step, at some thousand samples
+a second, a recorder that has to wait for the processor is soon hundreds behind, and wants all of them. A model is kept for whoever comes later.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 __all__ = ["DIAGNOSTICS", "MODEL", "SAMPLES"]
 
-SAMPLES = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=128, reliability=ReliabilityPolicy.RELIABLE)
+SAMPLES = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=2000, reliability=ReliabilityPolicy.RELIABLE)
 """``joint_states``, ``reference``, ``feedforward_force``, ``force_command``."""
 
 MODEL = QoSProfile(

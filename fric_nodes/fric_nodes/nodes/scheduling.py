@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import gc
 import os
 from pathlib import Path
 
-__all__ = ["settle_memory", "use_realtime_scheduling"]
+__all__ = ["use_realtime_scheduling"]
 
 
 def use_realtime_scheduling(priority: int) -> str:
@@ -23,9 +22,3 @@ def use_realtime_scheduling(priority: int) -> str:
     except OSError as error:
         return f"normal: SCHED_FIFO was refused ({error.strerror}); see ulimit -r"
     return f"SCHED_FIFO {priority}"
-
-
-def settle_memory() -> None:
-    """Take what was made so far out of the garbage collector's rounds, which otherwise stop the loop for milliseconds."""
-    gc.collect()
-    gc.freeze()

@@ -17,9 +17,9 @@ far below the error of the midpoint rule.
 With slip dynamics a step in which the velocity changes its sign is split where it does, since |v| has a kink there.
 
 Sticking is exact. Without slip dynamics the contact force is set-valued at v = 0: a body at rest stays where it is, to the last
-bit, while |u - F(q, 0)| does not exceed the slip level. A sliding body whose v_1 would change sign comes to rest within the step, at
-h_1 = m v_0 / (F(w) + F_contact(w) - u) with w = v_0/2, since v_1 = 0 makes the midpoint equation explicit in h_1; what is left of
-the step starts from rest. No tanh, no velocity threshold, no step that has to go to zero.
+bit, while |u - F(q, 0)| does not exceed the slip level. A sliding body whose v_1 would change sign comes to rest within the
+step, at h_1 = m v_0 / (F(w) + F_contact(w) - u) with w = v_0/2, since v_1 = 0 makes the midpoint equation explicit in h_1; what
+is left of the step starts from rest. No tanh, no velocity threshold, no step that has to go to zero.
 Source: set-valued Coulomb friction as in Acary and Brogliato 2008, chapter 1; the closed form for h_1 is derived here.
 """
 
@@ -34,6 +34,7 @@ from ..parameter import Parameter
 from ..plant import Plant
 
 __all__ = ["PLANT"]
+
 
 @kernel
 def opposing(
@@ -189,7 +190,9 @@ PLANT = Plant(
     title="rigid axis",
     equation="m dv/dt = u - F(q, v, t) - F_contact",
     source="Newton; implicit midpoint rule with exact stops, derived in the module",
-    parameters=(Parameter("mass", "m", "F s^2/x", "moving mass, or moment of inertia of a rotary axis", positive=True, linear=True),),
+    parameters=(
+        Parameter("mass", "m", "F s^2/x", "moving mass, or moment of inertia of a rotary axis", positive=True, linear=True),
+    ),
     states=("position", "velocity"),
     functions=(opposing, solve, glide, slide, step, drive),
     inertia=_inertia,

@@ -1,0 +1,175 @@
+"""Online identification: what offline finds, held at rest, following a change, undisturbed by bad samples and clocks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from fric_nodes.identification import METHODS
+from fric_nodes.identification.online import Estimate, OnlineIdentifier, State
+from fric_nodes.identification.result import Options
+from fric_nodes.model import Model, build_model, term
+from fric_nodes.record import Record
+
+NAMES = ("mass", "coulomb.force", "viscous.coefficient", "bias.force")
+
+
+def structure() -> Model:
+    terms = [term("coulomb", force=1.0), term("viscous", coefficient=1.0), term("bias", force=0.0)]
+    return build_model("rigid", {"mass": 1.0}, terms)
+
+
+def feed(identifier: OnlineIdentifier, record: Record, start: float = 0.0) -> None:
+    force = 0.5 * (record.effort + np.r_[record.effort[0], record.effort[:-1]])
+    for t, q, u in zip((record.time + start).tolist(), record.position.tolist(), force.tolist(), strict=True):
+        identifier.update(t, q, u)
+
+
+def value(estimate: Estimate, name: str) -> float:
+    return float(estimate.values[estimate.names.index(name)])
+
+
+def error(estimate: Estimate, name: str) -> float:
+    return float(estimate.standard_errors[estimate.names.index(name)])
+
+
+def test_for_ever_remembering_it_ends_where_offline_ends(mover: Callable[..., Any]) -> None:
+    record = mover(asymmetry=0.0).record(noise=0.3, resolution=1e-6)
+    options = Options(rest_velocity=0.005)
+    identifier = OnlineIdentifier(structure(), math.inf, options)
+    feed(identifier, record)
+    found = identifier.estimate()
+    offline = METHODS["inverse-dynamics"].fit(structure(), [replace(record, effort_hold="following")], options).model
+    for name in NAMES:
+        assert value(found, name) == pytest.approx(offline.value(name), rel=0.02 if name == "bias.force" else 0.01), name
+        assert error(found, name) == pytest.approx(offline.standard_errors[name], rel=0.6), name
+    assert np.all(found.excited)
+    assert found.status == "every parameter is determined"
+
+
+@pytest.mark.parametrize("encoder", [0.0, 1e-6])
+def test_ten_minutes_of_rest_change_nothing(mover: Callable[..., Any], encoder: float) -> None:
+    record = mover(duration=15.0, asymmetry=0.0).record(noise=0.3, resolution=1e-6)
+    identifier = OnlineIdentifier(structure(), 20.0)
+    feed(identifier, record)
+    before = identifier.estimate()
+    rng = np.random.default_rng(7)
+    # 100 Hz would do for a rest; 250 Hz keeps the blocks like those before. The encoder flickers by a count, the drive pushes.
+    n = 600 * 250
+    where = record.position[-1] + encoder * (rng.uniform(size=n) < 0.1)
+    push = 4.0 * np.sin(2 * np.pi * 0.05 * np.arange(n) / 250) + 0.3 * rng.standard_normal(n)
+    for k in range(n):
+        identifier.update(20.0 + k / 250, float(where[k]), float(push[k]))
+    after = identifier.estimate()
+    for name in NAMES:
+        assert value(after, name) == pytest.approx(value(before, name), rel=1e-3), name
+        assert error(after, name) == pytest.approx(error(before, name), rel=0.05), name
+
+
+def test_it_follows_a_step_of_friction(mover: Callable[..., Any]) -> None:
+    first = mover(duration=15.0, asymmetry=0.0).record(noise=0.3, resolution=1e-6)
+    second = mover(duration=30.0, seed=5, asymmetry=0.0, coulomb=12.0).record(noise=0.3, resolution=1e-6)
+    identifier = OnlineIdentifier(structure(), 5.0)
+    feed(identifier, first)
+    assert value(identifier.estimate(), "coulomb.force") == pytest.approx(8.0, rel=0.02)
+    feed(identifier, second, start=20.0)
+    found = identifier.estimate()
+    assert value(found, "coulomb.force") == pytest.approx(12.0, rel=0.02)
+    assert value(found, "mass") == pytest.approx(2.0, rel=0.02)
+
+
+def test_bad_samples_are_refused_counted_and_do_no_harm(mover: Callable[..., Any]) -> None:
+    record = mover(duration=15.0, asymmetry=0.0).record(noise=0.3, resolution=1e-6)
+    clean = OnlineIdentifier(structure(), 30.0)
+    feed(clean, record)
+    dirty = OnlineIdentifier(structure(), 30.0)
+    force = 0.5 * (record.effort + np.r_[record.effort[0], record.effort[:-1]])
+    for k, (t, q, u) in enumerate(zip(record.time.tolist(), record.position.tolist(), force.tolist(), strict=True)):
+        if k % 500 == 250:
+            for bad in ((math.nan, q, u), (t, math.nan, u), (t, q, math.inf), (t - 0.0015, q + 1.0, u), (t - 0.001, q, 1e9)):
+                assert dirty.update(*bad) is False
+        dirty.update(t, q, u)
+    assert dirty.samples_rejected == 30 * 5
+    np.testing.assert_allclose(dirty.estimate().values, clean.estimate().values, rtol=1e-9)
+
+
+def test_a_clock_that_jumps_costs_a_block_and_no_more(mover: Callable[..., Any]) -> None:
+    record = mover(duration=30.0, asymmetry=0.0).record(noise=0.3, resolution=1e-6)
+    identifier = OnlineIdentifier(structure(), math.inf)
+    force = 0.5 * (record.effort + np.r_[record.effort[0], record.effort[:-1]])
+    for k, (t, q, u) in enumerate(zip(record.time.tolist(), record.position.tolist(), force.tolist(), strict=True)):
+        # An hour ahead after 10 s, then back behind the start after 20 s.
+        jump = 0.0 if k < 10_000 else 3600.0 if k < 20_000 else -500.0
+        identifier.update(t + jump, q, u)
+    found = identifier.estimate()
+    assert value(found, "mass") == pytest.approx(2.0, rel=0.02)
+    assert value(found, "coulomb.force") == pytest.approx(8.0, rel=0.02)
+    assert found.samples_used > 18_000
+
+
+@pytest.mark.parametrize("forgetting_time", [60.0, 5.0])
+def test_the_intervals_hold_what_they_promise_under_coloured_noise(mover: Callable[..., Any], forgetting_time: float) -> None:
+    run = mover(duration=12.0, asymmetry=0.0)
+    values, errors = [], []
+    for seed in range(14):
+        identifier = OnlineIdentifier(structure(), forgetting_time)
+        feed(identifier, run.record(noise=1.0, seed=seed, colour=0.9))
+        found = identifier.estimate()
+        values.append([value(found, name) for name in NAMES])
+        errors.append([error(found, name) for name in NAMES])
+    off = np.array(values) - np.mean(values, axis=0)
+    inside = np.abs(off) <= 1.645 * np.array(errors)
+    assert 0.75 <= np.mean(inside) <= 0.99, np.mean(inside, axis=0)
+
+
+def test_before_motion_nothing_is_known_and_it_says_so() -> None:
+    identifier = OnlineIdentifier(structure())
+    for k in range(5000):
+        identifier.update(1e-3 * k, 0.3, 1.0)
+    found = identifier.estimate()
+    assert found.samples_used == 0
+    assert np.all(np.isnan(found.standard_errors))
+    assert not np.any(found.excited)
+    assert found.status == "waiting for motion"
+    np.testing.assert_allclose(found.values, structure().values)
+
+
+def test_one_direction_at_constant_speed_determines_nothing_alone() -> None:
+    identifier = OnlineIdentifier(structure())
+    rng = np.random.default_rng(1)
+    for k in range(8000):
+        identifier.update(1e-3 * k, 2e-4 * k, 8.0 + 15.0 * 0.2 + 0.8 + 0.1 * float(rng.standard_normal()))
+    found = identifier.estimate()
+    assert not np.any(found.excited)
+    assert "not determined yet" in found.status
+
+
+def test_freeze_holds_and_reset_forgets(mover: Callable[..., Any]) -> None:
+    record = mover(duration=15.0, asymmetry=0.0).record(noise=0.3)
+    identifier = OnlineIdentifier(structure(), 30.0)
+    feed(identifier, record)
+    before = identifier.estimate().values
+    identifier.freeze(True)
+    assert identifier.estimate().state is State.FROZEN
+    feed(identifier, replace(record, effort=3.0 * record.effort), start=100.0)
+    np.testing.assert_array_equal(identifier.estimate().values, before)
+    identifier.freeze(False)
+    feed(identifier, record, start=200.0)
+    assert identifier.estimate().samples_used > 20_000
+    identifier.reset()
+    assert identifier.estimate().samples_used == 0
+    np.testing.assert_array_equal(identifier.estimate().values, structure().values)
+
+
+def test_slip_dynamics_stay_as_given_in_the_model(mover: Callable[..., Any]) -> None:
+    whole = structure().with_terms([*structure().terms, term("presliding", stiffness=1e6, damping=500.0)])
+    identifier = OnlineIdentifier(whole, 30.0)
+    feed(identifier, mover(duration=15.0, asymmetry=0.0).record(noise=0.3))
+    model = identifier.model()
+    assert model.value("presliding.stiffness") == 1e6
+    assert model.value("coulomb.force") == pytest.approx(8.0, rel=0.02)
+    assert set(model.standard_errors) == set(NAMES)
