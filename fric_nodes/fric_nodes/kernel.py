@@ -11,17 +11,23 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from numba import njit
+from numba.core.options import DefaultOptions
 
 __all__ = ["kernel", "loop"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+# The counting is numba's only option without a documented name; where a version has it no longer, it is only slower.
+_UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+_COMMON: dict[str, Any] = {"error_model": "numpy", "nogil": True, **_UNCOUNTED}
+
+
 def kernel(function: Function) -> Function:
     """``function``, compiled at its first call, for use in a step loop."""
-    return cast(Function, njit(error_model="numpy", nogil=True, forceinline=True, _nrt=False)(function))
+    return cast(Function, njit(**_COMMON, forceinline=True)(function))
 
 
 def loop(function: Function) -> Function:
     """``function`` as a loop over steps, compiled at its first call or taken from the disk cache of its module."""
-    return cast(Function, njit(error_model="numpy", nogil=True, cache=True, _nrt=False)(function))
+    return cast(Function, njit(**_COMMON, cache=True)(function))

@@ -214,3 +214,31 @@ def test_the_step_follows_the_natural_frequency() -> None:
         n = substeps(axis(stiffness=stiffness, mass=mass), 1e-3)
         assert 1e-3 / n * np.sqrt(stiffness / mass) <= 0.04 * (1 + 1e-12)
     assert substeps(axis(stiffness=10.0), 1e-3) == 1
+
+
+@pytest.mark.parametrize("r", [0.0, 1e-12, 1e-6, 1e-3, 0.05, 0.1249, 0.1251, 0.4, 3.0, 39.9, 40.1, 1e3])
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_step_at_constant_velocity_is_exact(r: float, direction: float) -> None:
+    # dz/dt = v - a z with a = sigma_0 |v| / g: the series of its solution, summed in extended precision.
+    level, h, stiffness, damping, z_0 = 5.0, 1e-3, 1e5, 100.0, 2e-5
+    v = direction * r * level / (stiffness * h)
+    a = np.longdouble(stiffness) * abs(v) / level
+    if r < 1.0:
+        psi = np.longdouble(0.0)
+        product = np.longdouble(0.5)
+        for k in range(3, 40):
+            psi += product
+            product *= -np.longdouble(r) / k
+        phi = 1 - np.longdouble(r) * psi
+    else:
+        phi = (1 - np.exp(-np.longdouble(r))) / np.longdouble(r)
+        psi = (1 - phi) / np.longdouble(r)
+    z_1 = z_0 + (v - a * z_0) * phi * h
+    z_mean = z_0 * phi + v * h * psi
+    slip = term("presliding", stiffness=1.0).effect.slip
+    assert slip is not None
+    z, z_next = np.array([9.0, z_0]), np.zeros(2)
+    friction = slip(z, z_next, 1, v, h, level, stiffness, damping)
+    assert z_next[1] == pytest.approx(float(z_1), rel=1e-12)
+    assert friction == pytest.approx(float(stiffness * z_mean + damping * (z_1 - z_0) / h), rel=1e-11)
+    assert (z[0], z[1], z_next[0]) == (9.0, z_0, 0.0)

@@ -80,7 +80,7 @@ class ImportMap(_Strict):
     decimal: Literal[".", ","] | None = None
     skip_rows: int | None = Field(default=None, ge=0)
     header: bool | None = None
-    effort_hold: Literal["following", "preceding", "linear"] = "following"
+    effort_hold: Literal["following", "preceding", "linear"] = "linear"
 
     @model_validator(mode="after")
     def _moves(self) -> ImportMap:

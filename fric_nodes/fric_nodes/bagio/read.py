@@ -177,7 +177,7 @@ class _Reading:
         if from_command:
             self._after_first_command(samples)
         check_samples(self.where, samples, repair=self.repair)
-        hold = custom.get("fric.effort_hold", "following")
+        hold = custom.get("fric.effort_hold", "linear")
         kept = samples.signals
         return Record(
             time=(samples.time_ns - samples.time_ns[0]) * 1e-9,

@@ -42,7 +42,7 @@ def slip(z: Any, z_next: Any, i: int, v: float, h: float, level: float, stiffnes
         psi = (1.0 - phi) / r
     z_rate = (v - fading * z_0) * phi
     z_next[i] = z_0 + h * z_rate
-    return stiffness * (z_0 * phi + v * h * psi) + damping * z_rate
+    return float(stiffness * (z_0 * phi + v * h * psi) + damping * z_rate)
 
 
 def _rate(mass: float, stiffness: float, damping: float) -> float:

@@ -160,7 +160,7 @@ def _velocity_noise(stretch: Stretch, band: float) -> float:
     quiet = float(np.sqrt(np.quantile(np.mean(windows**2, axis=1), 0.25)))
     # Rounding of the position itself, which filters add up over many samples.
     rounding = 1e-13 * float(np.max(np.abs(stretch.raw_position)))
-    return (quiet + rounding) * 2.0 * np.pi * band**1.5 * float(np.sqrt(2.0 / 3.0 * stretch.sample_time))
+    return float((quiet + rounding) * 2.0 * np.pi * band**1.5 * np.sqrt(2.0 / 3.0 * stretch.sample_time))
 
 
 def _at_rest(velocity: Array, limit: float, row_time: float) -> Mask:

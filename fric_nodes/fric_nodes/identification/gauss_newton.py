@@ -77,10 +77,7 @@ def minimise(
         _differences(function, point, residual, upper, difference, jacobian)
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
         for _ in range(30):
-            step = _bounded_step(normal, gradient, damping, lower - point, upper - point)
-            # No parameter changes by more than most of its size at once: a scale that has shrunk to nothing has no way back.
-            reach = _REACH * np.maximum(np.abs(point), _REACH_FROM_ZERO)
-            step /= max(1.0, float(np.max(np.abs(step) / reach)))
+            step = _proposal(normal, gradient, damping, point, lower, upper)
             # Decrease of the sum of squares that the linear model promises.
             promised = -float(step @ (2.0 * gradient + normal @ step))
             small = np.all(np.abs(step) <= point_tolerance * (np.abs(point) + point_tolerance))
@@ -119,6 +116,16 @@ def _differences(
         moved = point.copy()
         moved[number] += shift
         jacobian[:, number] = (function(moved) - residual) / (moved[number] - point[number])
+
+
+def _proposal(normal: Array, gradient: Array, damping: float, point: Array, lower: Array, upper: Array) -> Array:
+    """The damped step within bounds, shortened where a parameter would change by more than most of its size.
+
+    A scale that has shrunk to nothing at once has no way back.
+    """
+    step = _bounded_step(normal, gradient, damping, lower - point, upper - point)
+    reach = _REACH * np.maximum(np.abs(point), _REACH_FROM_ZERO)
+    return np.asarray(step / max(1.0, float(np.max(np.abs(step) / reach))), dtype=np.float64)
 
 
 def _bounded_step(normal: Array, gradient: Array, damping: float, lowest: Array, highest: Array) -> Array:

@@ -167,7 +167,9 @@ class OnlineIdentifier:
             self.samples_rejected += after
             return False
         try:
-            record = Record(time - time[0], np.array(self._position), np.array(self._effort), source="joint states")
+            record = Record(
+                time - time[0], np.array(self._position), np.array(self._effort), effort_hold="linear", source="joint states"
+            )
             found = self._equations(record)
         except (RecordError, IdentificationError):
             self._clear_buffer()

@@ -26,7 +26,7 @@ COMMON = (
     NodeParameter(
         "realtime_priority", 0, "wall time: SCHED_FIFO priority to ask the system for; 0: normal scheduling", "", 0, 99
     ),
-    NodeParameter("wait_for_subscribers", 1, "lock-step, excitation: publish samples only when so many listen", "", 0, 100),
+    NodeParameter("wait_for_subscribers", 1, "publish the first sample when so many listen; later ones always", "", 0, 100),
     NodeParameter("realtime_priority", 0, "SCHED_FIFO priority of the node's threads; 0: none", "", 0, 99),
     NodeParameter("diagnostics_period", 1.0, "time between two reports on /diagnostics", "s", 0.01, 3600.0),
 )

@@ -73,7 +73,7 @@ class CompensatorNode(LoopNode):
         given = self.settings.number("preview")
         # The middle of the interval in which the command acts. In wall time the reference is half a period old on average when
         # a joint state meets it, and the messages take a while.
-        return given if given >= 0.0 else (0.5 if self.lock_step else 1.75) * self.period
+        return given if given >= 0.0 else (0.5 if self.lock_step else 1.3) * self.period
 
     def _on_settings(self, _changed: set[str]) -> None:
         self._feedforward.enabled = self.settings.flag("enabled")

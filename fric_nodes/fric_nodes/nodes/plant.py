@@ -42,7 +42,6 @@ PARAMETERS = (
     NodeParameter("watchdog_time", 0.1, "wall time: without a command for so long the force is zero", "s", 1e-3, 1e6),
     NodeParameter("retry_time", 0.2, "lock-step: repeat the state when no command has come for so long", "s", 1e-2, 1e3),
     NodeParameter("duration", 0.0, "end after so much time of the axis; 0: endless", "s", 0.0, 1e9),
-    NodeParameter("wait_for_subscribers", 0, "publish the first sample when joint_states has so many subscribers", "", 0, 100),
     STAMPED,
 )
 
@@ -74,7 +73,6 @@ class PlantNode(LoopNode):
         self._state = JointState(name=[self.joint], position=[0.0])
         self._state.header.frame_id = self.joint
         self._publisher = self.create_publisher(JointState, "joint_states", SAMPLES)
-        self._audience = settings.integer("wait_for_subscribers")
         self.create_subscription(force_type(self), "force_command", self._on_command, SAMPLES)
         if self.lock_step:
             self._period_ns = from_seconds(self.period)
@@ -90,10 +88,6 @@ class PlantNode(LoopNode):
             self._watchdog = from_seconds(settings.number("watchdog_time"))
             self._fed = False
             self.create_timer(self.period, self._tick)
-
-    def _waiting(self) -> bool:
-        """True while those who must not miss the first sample are not all there."""
-        return self._sample == 0 and self._publisher.get_subscription_count() < self._audience
 
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report."""
@@ -136,7 +130,7 @@ class PlantNode(LoopNode):
 
     def _go_on(self) -> None:
         """Advance as far as there are commands."""
-        if self._waiting():
+        if not self.has_audience(self._publisher):
             return
         while (force := self._commands.get(self._sample * self._period_ns)) is not None:
             if self._sample >= self._last_sample:
@@ -183,7 +177,7 @@ class PlantNode(LoopNode):
             return
         now = time.monotonic_ns()
         self._advance_to(now)
-        if self._waiting():
+        if not self.has_audience(self._publisher):
             return
         if self._sample == 0:
             self.get_logger().info("started")

@@ -1,7 +1,8 @@
 """Quality of service of every topic, in one place.
 
 Samples are reliable and kept in a queue that holds far more than a node can be behind: in lock-step, at some thousand samples
-a second, a recorder that has to wait for the processor is soon hundreds behind, and wants all of them. A model is kept for whoever comes later.
+a second, a recorder that has to wait for the processor is soon hundreds behind, and wants all of them. A model is kept for
+whoever comes later.
 """
 
 from __future__ import annotations

@@ -178,7 +178,7 @@ def step(
 @kernel
 def drive(p: Any, q: float, v: float, a: float) -> float:
     """Force that moves the body against nothing but its inertia [F]."""
-    return p[0] * a
+    return float(p[0] * a)
 
 
 def _inertia(mass: float) -> float:

@@ -1,0 +1,36 @@
+"""Rate of the lock-step loop: plant, excitation, compensator and PID in four processes over DDS."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+
+from ..demo.graph import Graph, NodeSetup, free_domain
+from ..shared_files import config_file
+from .benchmark import Benchmark, Figure
+
+__all__ = ["BENCHMARK"]
+
+_DURATION = 20.0  # [s] of the axis, at 500 Hz
+
+
+def run() -> list[Figure]:
+    """Samples per second of wall time, as the plant counts them."""
+    loop: dict[str, object] = {"lock_step": True}
+    nodes = [
+        NodeSetup("excitation", loop, config_file("demo_motion.yaml")),
+        NodeSetup("compensator", loop | {"model_file": config_file("demo_axis.yaml")}, config_file("compensator.yaml")),
+        NodeSetup("pid", loop, config_file("pid_lock_step.yaml")),
+        NodeSetup("plant", loop | {"duration": _DURATION}, config_file("plant.yaml")),
+    ]
+    with tempfile.TemporaryDirectory() as folder, Graph(nodes, Path(folder), free_domain()) as graph:
+        graph.wait_for("plant", timeout=120.0)
+        graph.stop()
+        words = graph.text_of("plant")
+    found = re.search(r"(\d+(?:\.\d+)?) samples/s", words)
+    assert found is not None, words
+    return [Figure("lock-step loop, four processes", float(found.group(1)), "samples/s", ">= 800")]
+
+
+BENCHMARK = Benchmark("lock-step", "the lock-step loop", run)

@@ -1,0 +1,38 @@
+"""Prediction error on an axis simulated elsewhere."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from fric_nodes.identification import METHODS
+from fric_nodes.identification.result import Options
+from fric_nodes.model import Model, Term, build_model, term
+
+FIT = METHODS["prediction-error"].fit
+
+
+def structure(*more: Term) -> Model:
+    terms = [term("coulomb", force=1.0), term("viscous", coefficient=1.0), term("bias", force=0.0), *more]
+    return build_model("rigid", {"mass": 1.0}, terms)
+
+
+def test_sticking_and_sliding_come_back_without_the_bias_of_filters(slider: Any) -> None:
+    found = FIT(structure(term("asymmetry")), [slider.record(noise=0.1, resolution=1e-7)], Options())
+    for name, value in {"mass": 2.0, "coulomb.force": 8.0, "viscous.coefficient": 15.0, "bias.force": 0.8}.items():
+        assert found.model.value(name) == pytest.approx(value, rel=0.02), name
+        assert abs(found.model.value(name) - value) < 5.0 * found.model.standard_errors[name] + 2e-3 * value, name
+
+
+def test_the_bristles_come_back(bristled: Any) -> None:
+    model = structure(term("asymmetry"), term("presliding", stiffness=1e4, damping=0.0))
+    # The force as it was applied: the method takes what is recorded to be what acts, to which others may add.
+    found = FIT(model, [bristled.record(resolution=1e-8)], Options())
+    for name, value, rel in (
+        ("mass", 2.0, 0.005),
+        ("coulomb.force", 8.0, 0.005),
+        ("viscous.coefficient", 15.0, 0.01),
+        ("presliding.stiffness", 2e5, 0.01),
+        ("presliding.damping", 400.0, 0.02),
+    ):
+        assert found.model.value(name) == pytest.approx(value, rel=rel), name
