@@ -100,7 +100,7 @@ def json_schema() -> dict[str, Any]:
     whole = create_model(
         "fric_model_1",
         __base__=_Header,
-        plant=(Union[plants], ...),  # noqa: UP007 - built from a tuple
+        plant=(Union[plants], ...),  # type: ignore[arg-type] # noqa: UP007 - built from a tuple
         terms=(list[Union[terms]], ...),  # type: ignore[valid-type] # noqa: UP007
     )
     return whole.model_json_schema()

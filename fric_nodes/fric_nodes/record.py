@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 
-__all__ = ["Array", "Mask", "Record", "RecordError", "Units"]
+__all__ = ["Array", "Index", "Mask", "Record", "RecordError", "Units"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Index = NDArray[np.int64]
 
 _HOLDS = ("following", "preceding", "linear")
 
@@ -176,10 +177,11 @@ class Record:
         if sample_time is None and self.is_uniform():
             return self
         step = self.sample_time if sample_time is None else sample_time
-        grid = np.arange(int(np.floor(self.duration / step * (1 + 1e-12))) + 1) * step
+        n_steps = int(np.floor(self.duration / step * (1 + 1e-12)))
+        grid = np.arange(n_steps + 1, dtype=np.float64) * step
 
         def on_grid(signal: Array) -> Array:
-            return np.interp(grid, self.time, signal)
+            return np.asarray(np.interp(grid, self.time, signal), dtype=np.float64)
 
         valid = None
         if self.valid is not None:

@@ -198,7 +198,9 @@ def predict_force(
     load: Array = _NOMINAL_LOAD,
     temperature: Array = _NOMINAL_TEMPERATURE,
 ) -> Array:
-    """Force that ``model`` needs for a given motion [F], shape ``(n_samples,)``; at zero velocity without slip dynamics,
-    none."""
+    """Force that ``model`` needs for a given motion [F], shape ``(n_samples,)``.
+
+    Without slip dynamics there is no friction in it where the velocity is zero: at rest it isn't determined by the motion.
+    """
     effort, _ = Predictor(model).run(time, position, velocity, acceleration, sample_time, load, temperature)
     return effort

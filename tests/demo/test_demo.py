@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
-
 from fric_nodes.demo.graph import Graph, GraphError, NodeSetup
 from fric_nodes.demo.outcome import read_run
 from fric_nodes.record import Record, RecordError, Units
+from ruamel.yaml import YAML
 
 
 def test_values_reach_ros_with_their_type() -> None:

@@ -35,7 +35,7 @@ def _recording() -> Record:
         ],
     )
     generator = np.random.default_rng(7)
-    at = np.arange(_N_SAMPLES) * 1e-3
+    at = np.arange(_N_SAMPLES, dtype=np.float64) * 1e-3
     effort = sum(30.0 * np.sin(2 * np.pi * f * at + p) for f, p in ((0.16, 0.0), (0.41, 1.0), (1.07, 2.0), (2.3, 0.5)))
     effort = np.asarray(effort) - 3.0
     motion = simulate(truth, effort, 1e-3, n_substeps=4)

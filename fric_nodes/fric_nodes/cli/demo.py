@@ -26,7 +26,7 @@ def demo(
     seed: Annotated[int, typer.Option("--seed", help="Of motion and noise.", min=0)] = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Excite, record, identify and compensate an axis whose friction the identifier doesn't know; all over real ROS 2 topics."""
+    """Excite, record, identify and compensate an axis whose friction the identifier doesn't know, over real ROS 2 topics."""
     from ..demo.run import DemoSettings, run_demo
 
     start = clock_of_wall.monotonic()
@@ -39,9 +39,8 @@ def demo(
     ratio = before.rms / after.rms
     tell(f"tracking error {1e6 * before.rms:.3g} µm RMS before, {1e6 * after.rms:.3g} µm after: {ratio:.1f} times less")
     if clock == "wall":
-        tell(
-            f"missed deadlines: {before.missed} of {before.record.n_samples} before, {after.missed} of {after.record.n_samples} after"
-        )
+        counts = [f"{run.missed} of {run.record.n_samples}" for run in (before, after)]
+        tell(f"missed deadlines: {counts[0]} before, {counts[1]} after")
     if as_json:
         summary = {
             "tracking_rms_before": before.rms,

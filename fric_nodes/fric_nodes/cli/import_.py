@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,13 @@ import typer
 from .options import JsonOption, RepairOption
 
 __all__ = ["register"]
+
+
+class Storage(str, Enum):
+    """Storage formats of a bag."""
+
+    MCAP = "mcap"
+    SQLITE3 = "sqlite3"
 
 
 def register(app: typer.Typer) -> None:
@@ -22,16 +30,17 @@ def import_(
     file: Annotated[Path, typer.Argument(help=".mat, .csv, .txt, .npz or .parquet")],
     mapping: Annotated[Path, typer.Option("--map", help="YAML that says where each signal comes from, its unit and a factor.")],
     out: Annotated[Path, typer.Option("--out", help="Folder of the bag to write; must not exist.")],
-    storage: Annotated[str, typer.Option("--storage", help="mcap or sqlite3.")] = "mcap",
+    storage: Annotated[Storage, typer.Option("--storage", help="Format of the bag.")] = Storage.MCAP,
     repair: RepairOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Turn a recording into a rosbag2 that every other verb reads."""
-    from ..bagio.importing import import_recording, load_mapping
+    from ..bagio.importing import import_recording
+    from ..bagio.mapping import load_mapping
     from ..bagio.write import write_record
 
     record = import_recording(file, load_mapping(mapping), repair=repair)
-    write_record(record, out, storage=storage)
+    write_record(record, out, storage=storage.value)
     if as_json:
         summary = {
             "bag": str(out),

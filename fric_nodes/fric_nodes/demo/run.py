@@ -79,7 +79,11 @@ def _nodes(settings: DemoSettings, gains: PidGains, motion: str, model: Path | N
         "kd": gains.derivative,
         "filter_time": gains.filter_time,
     }
-    plant = loop | {"seed": settings.seed, "duration": _duration(settings, motion), "wait_for_subscribers": _LISTENERS[settings.clock]}
+    plant = loop | {
+        "seed": settings.seed,
+        "duration": _duration(settings, motion),
+        "wait_for_subscribers": _LISTENERS[settings.clock],
+    }
     recorder = {"bag": bag, "log_time": "stamp" if settings.clock == "lock-step" else "receive"}
     excitation = loop | {"seed": settings.seed, "wait_for_subscribers": 3}
     return [
@@ -175,7 +179,6 @@ def _commands(settings: DemoSettings, gains: PidGains, model: Path) -> list[str]
     for node in _nodes(settings, gains, "demo_motion", model, settings.out / "bags" / "by_hand"):
         rest = " ".join(node.command()[3:])
         lines.append(f"fric node {node.name} {rest}")
-    lines.append(
-        f"fric identify {settings.out / 'bags' / 'excitation'} --model {config_file('start_model.yaml')} --method prediction-error --out {settings.out / 'identified'}"
-    )
+    recording, start, out = settings.out / "bags" / "excitation", config_file("start_model.yaml"), settings.out / "identified"
+    lines.append(f"fric identify {recording} --model {start} --method prediction-error --out {out}")
     return lines

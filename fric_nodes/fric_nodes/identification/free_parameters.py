@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..model import Model
-from ..record import Array, Mask
+from ..record import Array, Index, Mask
 from .equations import Equations
 from .result import Options
 
@@ -31,8 +31,8 @@ class FreeParameters:
         names: their names.
     """
 
-    index: Array
-    linear: Array
+    index: Index
+    linear: Mask
     lower: Array
     upper: Array
     names: tuple[str, ...]

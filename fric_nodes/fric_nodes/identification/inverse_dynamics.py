@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
 from ..model import Model
-from ..record import Array, Mask, Record
+from ..record import Array, Index, Mask, Record
 from ..simulate import Predictor
 from .equations import Equations, Stretch, equations
 from .free_parameters import FreeParameters, candidates
@@ -69,7 +69,7 @@ def weights(residual: Array, use: Mask, robust: bool) -> Array:
     scale = 1.4826 * float(np.median(np.abs(residual[use])))
     if not robust or scale == 0.0:
         return use.astype(np.float64)
-    return use * np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), 1e-300))
+    return use.astype(np.float64) * np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), 1e-300))
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +233,7 @@ def _for_structure(options: Options, model: Model) -> Options:
     return Options(held=held, freed=tuple(name for name in options.freed if name in model.names))
 
 
-def _starts_within(found: Equations, use: Mask) -> Array:
+def _starts_within(found: Equations, use: Mask) -> Index:
     """First row of each stretch, and of each run of used rows, among the used rows."""
     row = np.flatnonzero(use)
     fresh = np.isin(row, found.starts) | (np.diff(row, prepend=row[0]) > 1)

@@ -4,12 +4,12 @@ The model is simulated from sample to sample, so that what happens between sampl
 not filtered away, and its state is pulled to the measured position after each one, so that no error builds up through the
 integrator. Minimises the sum of squared innovations e_k = q_k - q_hat(k | k-1).
 
-The correction is the steady-state Kalman filter of a double integrator whose acceleration is disturbed by the noise of the force,
-with standard deviation s_a, and whose position is read with noise s_q. Its gains follow from the tracking index
-L = s_a h^2 / s_q (Kalata 1984): r = (4 + L - sqrt(8 L + L^2)) / 4, alpha = 1 - r^2, beta = 2 (2 - alpha) - 4 sqrt(1 - alpha). The
-index is chosen from the data, as the one with the smallest innovations. With a right model the innovations are white, and
-least squares is maximum likelihood. The fit starts from the values of inverse dynamics and, since a Stribeck velocity or a
-stiffness has wrong valleys of its own, from others over their range; the best after a few steps goes on.
+The correction is the steady-state Kalman filter of a double integrator whose acceleration is disturbed by the noise of the
+force, with standard deviation s_a, and whose position is read with noise s_q. Its gains follow from the tracking index
+L = s_a h^2 / s_q (Kalata 1984): r = (4 + L - sqrt(8 L + L^2)) / 4, alpha = 1 - r^2, beta = 2 (2 - alpha) - 4 sqrt(1 -
+alpha). The index is chosen from the data, as the one with the smallest innovations. With a right model the innovations are
+white, and least squares is maximum likelihood. The fit starts from the values of inverse dynamics and, since a Stribeck
+velocity or a stiffness has wrong valleys of its own, from others over their range; the best after a few steps goes on.
 Source: Ljung 1999, section 7.2 and 7.4 (prediction errors of a state-space model).
 """
 
@@ -113,9 +113,10 @@ def innovations(model: Model, run: Run, index: float) -> Array:
     loops = model.loops
     found = np.empty(run.effort.shape[0])
     alpha, beta = _gains(index)
+    n_steps = substeps(model, float(np.median(run.step)), _STEP_OF_RATE)
     loops.observe(
-        model.values, run.effort, run.position, run.step, substeps(model, float(np.median(run.step)), _STEP_OF_RATE), run.load, run.temperature,
-        alpha, beta, run.noise, state, np.zeros(loops.n_friction_states), found,
+        model.values, run.effort, run.position, run.step, n_steps, run.load, run.temperature, alpha, beta, run.noise,
+        state, np.zeros(loops.n_friction_states), found,
     )  # fmt: skip
     return found[_SETTLING:]
 
@@ -139,7 +140,7 @@ def _minimise(
         model = start.with_values(trial)
         found = np.concatenate([innovations(model, run, index) for run in runs])
         # A run that escapes must cost much, not break the solver.
-        return np.nan_to_num(found, nan=1e3, posinf=1e3, neginf=-1e3)
+        return np.asarray(np.nan_to_num(found, nan=1e3, posinf=1e3, neginf=-1e3), dtype=np.float64)
 
     point = np.clip(values[free.index], free.lower, free.upper) / scale
     # Innovations are nanometres to micrometres: brought to one, so that the solver's tolerances mean something.
@@ -159,7 +160,7 @@ def _minimise(
 
 
 def _excerpt(runs: Sequence[Run]) -> list[Run]:
-    """A part of ``runs`` that is enough to choose between starts: the first third, the middle and the last, no more than needed."""
+    """As much of the beginning, the middle and the end of each run as it takes to choose between starts."""
     total = sum(run.effort.shape[0] for run in runs)
     share = min(1.0, _ENOUGH / total)
     parts = []

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..record import Array
+from ..record import Array, Index
 
 __all__ = ["bartlett_lag", "sandwich_covariance"]
 
@@ -28,7 +28,7 @@ def bartlett_lag(residual: Array) -> int:
     return int(min(np.ceil(lag), n // 4))
 
 
-def sandwich_covariance(jacobian: Array, residual: Array, weight: Array, starts: Array) -> Array:
+def sandwich_covariance(jacobian: Array, residual: Array, weight: Array, starts: Index) -> Array:
     """Covariance of the estimate, shape ``(n_parameters, n_parameters)``.
 
     Args:

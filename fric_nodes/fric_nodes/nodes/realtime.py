@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 __all__ = ["raise_priority"]
 
@@ -16,8 +17,8 @@ def raise_priority(priority: int) -> str | None:
     if not hasattr(os, "sched_setscheduler"):
         return "this system has no real-time scheduling"
     try:
-        for thread in os.listdir("/proc/self/task"):
-            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
+        for thread in Path("/proc/self/task").iterdir():
+            os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
         return "not permitted: grant CAP_SYS_NICE or an rtprio limit"
     except OSError as error:

@@ -59,8 +59,8 @@ def micrometres(metres: float) -> str:
 
 def _headline(outcome: DemoOutcome) -> str:
     return (
-        f"With the friction model identified from one recording, the tracking error along a contour that this recording did not "
-        f"contain falls from {micrometres(outcome.before.rms)} to {micrometres(outcome.after.rms)} RMS: "
+        f"With the friction model identified from one recording, the tracking error along a contour that this recording did "
+        f"not contain falls from {micrometres(outcome.before.rms)} to {micrometres(outcome.after.rms)} RMS: "
         f"{outcome.before.rms / outcome.after.rms:.0f} times less."
     )
 
@@ -107,8 +107,8 @@ def _excitation(outcome: DemoOutcome) -> Section:
         170,
     )
     note = (
-        "Slow reversals through the Stribeck range, moves from rest, and a multisine, under the PID alone. Position and force of "
-        f"this recording are all that the identification was given: {outcome.excitation.bag}."
+        "Slow reversals through the Stribeck range, moves from rest, and a multisine, under the PID alone. Position and force "
+        f"of this recording are all that the identification was given: {outcome.excitation.bag}."
     )
     return Section("The recording", (figure(plot, note),))
 
@@ -164,8 +164,8 @@ def _clock(outcome: DemoOutcome) -> str:
 
 def _controller(outcome: DemoOutcome) -> Section:
     text = (
-        "The PID has the largest integral gain that keeps the sensitivity within its bound, for the true mass and damping: it is "
-        "tuned as well as this axis and its delay allow, and is the same in every run."
+        "The PID has the largest integral gain that keeps the sensitivity within its bound, for the true mass and damping: it "
+        "is tuned as well as this axis and its delay allow, and is the same in every run."
     )
     loop = [*outcome.gains.items(), *outcome.margins.items()]
     return Section("The controller it is compared with", (paragraph(text), table(("", ""), loop, text_columns=(0, 1))))

@@ -158,9 +158,11 @@ def identification_report(
     score = result.validation if result.validation is not None else result.train
     which = "on the validation recording" if result.validation is not None else "on the recording it was fitted to"
     units = result.model.units
+    effects = ", ".join(held.effect.title for held in result.model.terms) or "no friction"
+    title = result.model.plant.title
     lead = (
-        f"{result.model.plant.title[0].upper()}{result.model.plant.title[1:]} '{result.model.joint}' with "
-        f"{', '.join(held.effect.title for held in result.model.terms) or 'no friction'}, from {len(train)} recording(s) by {result.method}."
+        f"{title[0].upper()}{title[1:]} '{result.model.joint}' with {effects}, "
+        f"from {len(train)} recording(s) by {result.method}."
     )
     found = equations(list(train), options)
     sections = [

@@ -48,7 +48,7 @@ def write_picture(outcome: DemoOutcome, path: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
         axes.grid(color="#e8edf2")
     with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
-        canvas.print_png(file)
+        canvas.print_png(file)  # type: ignore[no-untyped-call]
     written = Path(file.name)
     written.chmod(0o644)
     written.replace(path)
