@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import Typesdict
 
-__all__ = ["Block", "DecodeError", "decode"]
+__all__ = ["Block", "DecodeError", "decode", "layout_of"]
 
 _MANY_LAYOUTS = 64  # above this many layouts of one length, messages are decoded one by one
 _HEADER = 4  # bytes of encapsulation before the payload
@@ -148,7 +148,12 @@ class _Walker:
                     self.structure(base, f"{name}.{index}.")
 
 
-def _layout(message: bytes, msgtype: str, types: Typesdict) -> _Layout:
+def layout_of(message: bytes, msgtype: str, types: Typesdict) -> _Layout:
+    """Where the fields of ``message`` lie.
+
+    Raises:
+        DecodeError: the message doesn't fit its type.
+    """
     walker = _Walker(message, types)
     walker.structure(msgtype, "")
     # Up to three bytes of padding may follow; more means that the type is not the one that was written.
@@ -196,7 +201,7 @@ def _split(rows: NDArray[np.intp], table: NDArray[np.uint8], msgtype: str, types
     blocks: list[Block] = []
     while rows.size:
         try:
-            layout = _layout(table[0].tobytes(), msgtype, types)
+            layout = layout_of(table[0].tobytes(), msgtype, types)
         except DecodeError as error:
             raise DecodeError(str(error), int(rows[0])) from None
         if len(blocks) < _MANY_LAYOUTS:

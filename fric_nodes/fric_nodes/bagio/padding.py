@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from rosbags.interfaces.typing import Typesdict
 
-from .decode import DecodeError, _layout
+from .decode import DecodeError, layout_of
 
 __all__ = ["PaddingEraser"]
 
@@ -51,7 +51,7 @@ class PaddingEraser:
 
     def _derive(self, message: bytes) -> tuple[int, int]:
         """Masks of the bytes that decide about the layout, and of those that are not padding."""
-        layout = _layout(message, self._msgtype, self._types)
+        layout = layout_of(message, self._msgtype, self._types)
         deciding = np.zeros(len(message), dtype=np.uint8)
         kept = np.zeros(len(message), dtype=np.uint8)
         kept[:_HEADER] = 0xFF

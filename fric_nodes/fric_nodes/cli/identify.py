@@ -120,25 +120,13 @@ def _refuse_overlap(train: list[Path], validation: list[Path]) -> None:
 
 def _structure(model: Path | None, terms: str, record: Record) -> Model:
     """The model to fit: from a file, or from a list of effects with start values of one."""
-    from ..model import build_model
+    from ..identification.start import start_model
     from ..model_file import read_model
 
     if model is not None:
         return replace(read_model(model), joint=record.joint, standard_errors={}, provenance={})
     names = [name.strip() for name in terms.split(",") if name.strip()]
-    return build_model("rigid", {"mass": 1.0}, [_start_term(name) for name in names], joint=record.joint, units=record.units)
-
-
-def _start_term(name: str) -> Any:
-    """A term with start values that a fit will replace."""
-    from ..effects import by_name
-    from ..model import term
-
-    effect = by_name(*name.split("/", 1))
-    if effect is None:
-        return term(name)
-    values = {p.name: 0.0 if p.linear else 1.0 for p in effect.parameters if p.default is None}
-    return term(effect.id, effect.law, **values)
+    return start_model(names, record.joint, record.units)
 
 
 def _fit(method: str, structure: Model, records: list[Record], validation: list[Record], options: Options) -> Identification:

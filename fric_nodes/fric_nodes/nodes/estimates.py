@@ -2,35 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from fric_interfaces.msg import FrictionEstimate
 
-from ..effects import by_name
 from ..identification.online import Estimate
-from ..model import Model, Term, build_model, term
-from ..record import Units
+from ..model import Model
 from .convert import set_stamp
 
-__all__ = ["estimate_to_message", "start_model", "well_determined"]
+__all__ = ["estimate_to_message", "well_determined"]
 
 _FORCE_SHARE = 0.05  # of the largest force
-
-
-def start_model(terms: Iterable[str], joint: str, units: Units) -> Model:
-    """A rigid axis with ``terms`` (``effect`` or ``effect/law``) and start values that the estimate will replace.
-
-    Raises:
-        ModelError: an unknown effect, or effects that don't go together.
-    """
-
-    def start(name: str) -> Term:
-        effect = by_name(*name.split("/", 1))
-        if effect is None:
-            return term(name)  # which says what can be chosen
-        return term(effect.id, effect.law, **{p.name: 0.0 if p.linear else 1.0 for p in effect.parameters if p.default is None})
-
-    return build_model("rigid", {"mass": 1.0}, [start(name) for name in terms], joint=joint, units=units)
 
 
 def well_determined(estimate: Estimate, structure: Model) -> bool:

@@ -20,12 +20,13 @@ from fric_interfaces.srv import FreezeIdentification, ResetIdentification, SaveI
 from ..errors import InputError
 from ..identification.online import OnlineIdentifier, State
 from ..identification.result import Options
+from ..identification.start import start_model
 from ..model import Model
 from ..model_file import read_model, write_model
 from ..record import Units
 from .bulk import BulkSubscription
 from .convert import MessageError, joint_sample, model_to_message
-from .estimates import estimate_to_message, start_model, well_determined
+from .estimates import estimate_to_message, well_determined
 from .orderly import OrderlyNode, run
 from .parameters import NodeParameter, Settings
 from .qos import DIAGNOSTICS, MODEL, SAMPLES

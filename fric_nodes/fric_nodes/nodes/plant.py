@@ -19,6 +19,7 @@ from fric_interfaces.msg import StampedForce
 
 from ..axis import SimulatedAxis
 from ..model_file import read_model
+from ..shared_files import config_file
 from .base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent, wall_clock
 from .convert import MessageError, from_seconds, set_stamp
 from .forces import STAMPED, force_in, force_type
@@ -26,7 +27,6 @@ from .lockstep import Stream
 from .main import run
 from .parameters import NodeParameter
 from .qos import SAMPLES
-from .share import share_file
 
 __all__ = ["PlantNode", "main"]
 
@@ -57,7 +57,7 @@ class PlantNode(LoopNode):
         super().__init__("plant", PARAMETERS, **options)
         settings = self.settings
         self._axis = SimulatedAxis(
-            read_model(settings.text("model_file") or share_file("config/demo_axis.yaml")),
+            read_model(settings.text("model_file") or config_file("demo_axis.yaml")),
             resolution=settings.number("resolution"),
             force_noise=settings.number("force_noise"),
             force_limit=settings.number("force_limit"),
