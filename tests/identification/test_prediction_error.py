@@ -36,3 +36,12 @@ def test_the_bristles_come_back(bristled: Any) -> None:
         ("presliding.damping", 400.0, 0.02),
     ):
         assert found.model.value(name) == pytest.approx(value, rel=rel), name
+
+
+def test_noise_of_the_force_signal_does_not_make_the_axis_heavier(bristled: Any) -> None:
+    # The plain sum of squared innovations ends 6 % above the true mass here.
+    model = structure(term("asymmetry"), term("presliding", stiffness=1e4, damping=0.0))
+    found = FIT(model, [bristled.record(noise=0.1, resolution=1e-8)], Options())
+    assert found.model.value("mass") == pytest.approx(2.0, rel=0.02)
+    assert found.model.value("coulomb.force") == pytest.approx(8.0, rel=0.01)
+    assert found.model.value("viscous.coefficient") == pytest.approx(15.0, rel=0.02)

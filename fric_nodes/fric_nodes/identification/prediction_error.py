@@ -8,7 +8,13 @@ The correction is the steady-state Kalman filter of a double integrator whose ac
 force, with standard deviation s_a, and whose position is read with noise s_q. Its gains follow from the tracking index
 L = s_a h^2 / s_q (Kalata 1984): r = (4 + L - sqrt(8 L + L^2)) / 4, alpha = 1 - r^2, beta = 2 (2 - alpha) - 4 sqrt(1 -
 alpha). The index is chosen from the data, as the one with the smallest innovations. With a right model the innovations are
-white, and least squares is maximum likelihood. The fit starts from the values of inverse dynamics and, since a Stribeck
+white, and least squares is maximum likelihood.
+
+Where the noise of the force rules (a large index), an innovation is h^2 / (2 m) times that noise, and its plain sum of squares
+would reward a mass that is too large. It is then weighed with the mass, e_k m: the force that is missing, regressed on a
+motion that is known well, which is free of that bias.
+
+The fit starts from the values of inverse dynamics and, since a Stribeck
 velocity or a stiffness has wrong valleys of its own, from others over their range; the best after a few steps goes on.
 Source: Ljung 1999, section 7.2 and 7.4 (prediction errors of a state-space model).
 """
@@ -37,6 +43,7 @@ __all__ = ["METHOD", "Run", "fit", "innovations", "runs_of"]
 
 _INDICES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 _STEP_OF_RATE = 0.25  # coarser than a simulation's: from one sample to the next its error is far below any noise
+_FORCE_NOISE_RULES = 0.3  # tracking index from which the noise of the force outweighs that of the position
 _SETTLING = 20  # innovations dropped at the start of each run
 _ENOUGH = 9000  # samples that the choice between starts looks at
 
@@ -134,11 +141,15 @@ def _minimise(
     scale = np.abs(values[free.index])
     scale[scale == 0.0] = 1.0
 
+    inertia = start.plant.inertia(*start.plant_values)
+
     def errors(scaled: Array) -> Array:
         trial = values.copy()
         trial[free.index] = scaled * scale
         model = start.with_values(trial)
         found = np.concatenate([innovations(model, run, index) for run in runs])
+        if index >= _FORCE_NOISE_RULES:
+            found = found * (model.plant.inertia(*model.plant_values) / inertia)
         # A run that escapes must cost much, not break the solver.
         return np.asarray(np.nan_to_num(found, nan=1e3, posinf=1e3, neginf=-1e3), dtype=np.float64)
 
