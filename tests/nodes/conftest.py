@@ -134,3 +134,12 @@ def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
     graph = Graph(tmp_path)
     yield graph
     graph.close()
+
+
+@pytest.fixture
+def quick_switches() -> Iterator[None]:
+    """rclpy's multi-threaded executor spins while a callback runs, and hands the interpreter over at this interval only."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-4)
+    yield
+    sys.setswitchinterval(usual)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -181,16 +180,7 @@ def test_four_processes_repeat_themselves_byte_for_byte_and_survive_a_kill(graph
     assert abs(listener.values("joint_states", lambda m: m.position[0])[-1]) < 1e-4
 
 
-@pytest.fixture
-def _quick_switches() -> Iterator[None]:
-    """rclpy's multi-threaded executor spins while a callback runs, and hands the interpreter over at this interval only."""
-    usual = sys.getswitchinterval()
-    sys.setswitchinterval(1e-4)
-    yield
-    sys.setswitchinterval(usual)
-
-
-@pytest.mark.usefixtures("_quick_switches")
+@pytest.mark.usefixtures("quick_switches")
 @pytest.mark.parametrize("kind", [SingleThreadedExecutor, MultiThreadedExecutor, LeanExecutor])
 @pytest.mark.parametrize("look_ahead", [0, 16])
 def test_all_in_one_process_under_every_executor(graph: Graph, kind: type[Executor], look_ahead: int) -> None:

@@ -92,6 +92,7 @@ def _seconds(message: Any) -> float:
     return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
 
 
+@pytest.mark.usefixtures("quick_switches")
 @pytest.mark.parametrize("kind", [MultiThreadedExecutor, LeanExecutor])
 def test_loop_follows_the_reference_in_one_process(graph: Graph, kind: type[Executor]) -> None:
     listener = Listener(graph)
