@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..bagio.read import read_record
+from ..bagio import read_record, read_series
 from ..record import Array, Record, RecordError
 
 __all__ = ["Run", "read_run"]
@@ -45,7 +45,12 @@ def read_run(bag: Path, period: float) -> Run:
     record = read_record(bag, repair=True)
     if record.reference is None:
         raise RecordError(bag, "holds no reference", "record /reference as well")
-    record = record.between(_SETTLING, None)
+    given, states = (read_series(bag, topic).stamp_ns for topic in ("/reference", "/joint_states"))
+    if given is None or states is None:
+        raise RecordError(bag, "holds stamps of zero only", "record a graph whose clock runs")
+    # Where the recording holds no reference there is nothing to compare with.
+    last = 1e-9 * float(min(given[-1], states[-1]) - states[0])
+    record = record.between(_SETTLING, last)
     assert record.reference is not None
     error = record.reference - record.position
     return Run(

@@ -32,7 +32,6 @@ _MOTIONS = {"excitation": 44.5, "demo_motion": 21.5}  # parameter file of the mo
 # Who takes joint_states, so that the recorder doesn't miss the beginning: PID, recorder, and in lock-step the excitation.
 _LISTENERS = {"lock-step": 3, "wall": 2}
 _START_TIME = 5.0  # [s] that a node may take to start
-_PRIORITY = 20  # of the loop in wall time, where the system grants real-time priority
 # In wall time a command acts about half a period, 1 ms, after the measurement that it answers.
 _DELAY_PERIODS = {"lock-step": 0.0, "wall": 0.5}
 
@@ -70,8 +69,6 @@ def _duration(settings: DemoSettings, motion: str) -> float:
 def _nodes(settings: DemoSettings, gains: PidGains, motion: str, model: Path | None, bag: Path) -> list[NodeSetup]:
     """The five nodes of one run, in the order in which they are started."""
     loop: dict[str, object] = {"period": 1.0 / settings.rate, "lock_step": settings.clock == "lock-step"}
-    if settings.clock == "wall":
-        loop["realtime_priority"] = _PRIORITY
     compensator = loop | {"enabled": model is not None} | ({} if model is None else {"model_file": model})
     pid = loop | {
         "kp": gains.proportional,
@@ -95,7 +92,9 @@ def _nodes(settings: DemoSettings, gains: PidGains, motion: str, model: Path | N
     ]
 
 
-def _run(settings: DemoSettings, gains: PidGains, motion: str, model: Path | None, name: str) -> tuple[Run, float | None]:
+def _run(
+    settings: DemoSettings, gains: PidGains, motion: str, model: Path | None, name: str, tell: Callable[[str], None]
+) -> tuple[Run, float | None]:
     """One recorded run of the graph, and the lock-step rate that the plant reports."""
     bag = settings.out / "bags" / name
     *others, excitation = _nodes(settings, gains, motion, model, bag)
@@ -106,7 +105,10 @@ def _run(settings: DemoSettings, gains: PidGains, motion: str, model: Path | Non
         graph.start(excitation)
         graph.wait_for("plant", timeout=60.0 + 10.0 * _MOTIONS[motion])
         graph.stop()
-        words = graph.text_of("plant")
+        words, recorded = graph.text_of("plant"), graph.text_of("recorder")
+    lost = re.search(r"([1-9]\d*) lost", recorded)
+    if lost is not None:
+        tell(f"the recorder lost {lost.group(1)} messages of this run: the machine is too busy for its rate")
     found = re.search(r"(\d+(?:\.\d+)?) samples/s", words)
     return read_run(bag, 1.0 / settings.rate), float(found.group(1)) if found else None
 
@@ -144,15 +146,15 @@ def run_demo(settings: DemoSettings, tell: Callable[[str], None]) -> DemoOutcome
     delay = _DELAY_PERIODS[settings.clock] * period
     gains, margins = tune(truth.value("mass"), damping, period, delay=delay, filter_time=_FILTER_TIME)
     tell("exciting the axis under the PID alone, and recording it")
-    excitation, _ = _run(settings, gains, "excitation", None, "excitation")
+    excitation, _ = _run(settings, gains, "excitation", None, "excitation", tell)
     tell(f"identifying its friction from {excitation.bag}, by prediction error")
     result = identify(excitation.bag)
     model = settings.out / "model.yaml"
     write_model(result.model, model)
     tell("following a contour with the PID alone")
-    before, _ = _run(settings, gains, "demo_motion", None, "contour")
+    before, _ = _run(settings, gains, "demo_motion", None, "contour", tell)
     tell("following the same contour with the identified model fed forward")
-    after, rate = _run(settings, gains, "demo_motion", model, "contour_compensated")
+    after, rate = _run(settings, gains, "demo_motion", model, "contour_compensated", tell)
     result = replace(result, validation=score(result.model, [before.record], Options()))
     described, margins_described = _described(gains, margins)
     outcome = DemoOutcome(

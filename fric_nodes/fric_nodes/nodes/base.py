@@ -13,7 +13,6 @@ from rclpy.publisher import Publisher
 from rclpy.task import Future
 
 from .parameters import NodeParameter, Settings
-from .realtime import raise_priority
 from .scheduling import use_realtime_scheduling
 from .timing import Deadlines, Reporter
 
@@ -27,7 +26,6 @@ COMMON = (
         "realtime_priority", 0, "wall time: SCHED_FIFO priority to ask the system for; 0: normal scheduling", "", 0, 99
     ),
     NodeParameter("wait_for_subscribers", 1, "publish the first sample when so many listen; later ones always", "", 0, 100),
-    NodeParameter("realtime_priority", 0, "SCHED_FIFO priority of the node's threads; 0: none", "", 0, 99),
     NodeParameter("diagnostics_period", 1.0, "time between two reports on /diagnostics", "s", 0.01, 3600.0),
 )
 
@@ -61,10 +59,6 @@ class LoopNode(Node):
         self.finished: Future = Future()
         self._scheduling = "normal"
         self._heard = False
-        if priority := self.settings.integer("realtime_priority"):
-            refused = raise_priority(priority)
-            if refused is not None:
-                self.get_logger().warning(f"no real-time priority: {refused}")
         self._reporter = Reporter(
             self, self.settings.number("diagnostics_period"), self.deadlines, self.counters, self._all_conditions
         )
