@@ -32,8 +32,8 @@ _MOTIONS = {"excitation": 44.5, "demo_motion": 21.5}  # parameter file of the mo
 # Who takes joint_states, so that the recorder doesn't miss the beginning: PID, recorder, and in lock-step the excitation.
 _LISTENERS = {"lock-step": 3, "wall": 2}
 _START_TIME = 5.0  # [s] that a node may take to start
-# In wall time a command acts about half a period, 1 ms, after the measurement that it answers.
-_DELAY_PERIODS = {"lock-step": 0.0, "wall": 0.5}
+# In wall time a command acts a quarter of a millisecond after the measurement that it answers, twice that on a busy machine.
+_DELAY_PERIODS = {"lock-step": 0.0, "wall": 0.25}
 
 
 @dataclass(frozen=True)
