@@ -20,13 +20,13 @@ from scipy.optimize import least_squares, lsq_linear
 
 from ..model import Model
 from ..record import Array, Index, Mask, Record
-from ..simulate import Predictor
-from .equations import Equations, Stretch, equations
+from .conclusion import Fitted, concluded
+from .equations import Equations, equations
 from .free_parameters import FreeParameters, candidates
 from .result import Identification, IdentificationError, Method, Options
-from .scoring import score
+from .scoring import force_along
 from .statistics import sandwich_covariance
-from .verdict import collinear, warnings_of
+from .verdict import collinear
 
 __all__ = ["METHOD", "fit", "fit_force"]
 
@@ -36,20 +36,7 @@ _REWEIGHTINGS = 12
 
 def predicted(model: Model, found: Equations) -> Array:
     """Force that ``model`` predicts at the rows of ``found``, shape ``(n_rows,)``."""
-
-    def along(stretch: Stretch) -> Array:
-        effort, _ = Predictor(model).run(
-            stretch.time,
-            stretch.position,
-            stretch.velocity,
-            stretch.acceleration,
-            stretch.sample_time,
-            stretch.load,
-            stretch.temperature,
-        )
-        return effort
-
-    return found.rows(along)
+    return found.rows(lambda stretch: force_along(model, stretch))
 
 
 def regressors(model: Model, found: Equations) -> Array:
@@ -192,10 +179,8 @@ def _typical(model: Model, found: Equations, free: FreeParameters) -> Array:
     return np.array([sizes.get(dimensions[number], 1.0) for number in free.index])
 
 
-def fit_force(
-    model: Model, records: Sequence[Record], options: Options
-) -> tuple[Model, FreeParameters, Array, Equations, list[str]]:
-    """The fit itself: model, what was fitted, covariance, the equations and warnings about what was not."""
+def fit_force(model: Model, records: Sequence[Record], options: Options) -> Fitted:
+    """The fit itself, for this method and as the start of others."""
     found = equations(list(records), options)
     if int(np.sum(found.sliding)) < 2 * len(model.names):
         raise IdentificationError(
@@ -224,7 +209,7 @@ def fit_force(
     covariance[np.ix_(inside, inside)] = sandwich_covariance(
         jacobian[np.ix_(use, inside)], residual[use], weight[use], _starts_within(found, use)
     )
-    return model, free, covariance, found, messages
+    return Fitted(model, free, covariance, found, messages)
 
 
 def _for_structure(options: Options, model: Model) -> Options:
@@ -240,31 +225,13 @@ def _starts_within(found: Equations, use: Mask) -> Index:
     return np.flatnonzero(fresh)
 
 
-def standard_errors(free: FreeParameters, covariance: Array) -> dict[str, float]:
-    """Standard error by name, of those parameters that have one."""
-    variance = np.diag(covariance)
-    return {name: float(np.sqrt(value)) for name, value in zip(free.names, variance, strict=True) if value >= 0}
-
-
 def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
     """Fit ``structure`` to ``records`` by inverse dynamics.
 
     Raises:
         IdentificationError: the recordings can't determine it.
     """
-    model, free, covariance, found, messages = fit_force(structure, records, options)
-    model = model.with_values(model.values, standard_errors(free, covariance))
-    warnings, status = warnings_of(model, free, covariance)
-    return Identification(
-        model=model,
-        fitted=free.names,
-        covariance=covariance,
-        method=METHOD.id,
-        status=status,
-        warnings=(*messages, *warnings),
-        notes=found.notes,
-        train=score(model, records, options, found),
-    )
+    return concluded(METHOD.id, fit_force(structure, records, options), records, options)
 
 
 METHOD = Method(

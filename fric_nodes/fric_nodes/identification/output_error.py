@@ -18,12 +18,11 @@ from ..model import Model
 from ..record import Array, Record
 from ..simulate import Predictor, Simulator, intervals, substeps
 from . import inverse_dynamics
+from .conclusion import Fitted, concluded, standard_errors
 from .equations import Stretch
 from .gauss_newton import minimise
 from .result import Identification, Method, Options
-from .scoring import score
 from .statistics import sandwich_covariance
-from .verdict import warnings_of
 
 __all__ = ["METHOD", "fit"]
 
@@ -77,8 +76,9 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     Raises:
         IdentificationError: the recordings can't determine it.
     """
-    start, free, covariance, found, messages = inverse_dynamics.fit_force(structure, records, options)
-    known = inverse_dynamics.standard_errors(free, covariance)
+    begun = inverse_dynamics.fit_force(structure, records, options)
+    start, free, found = begun.model, begun.free, begun.found
+    known = standard_errors(free, begun.covariance)
     free = free.without({name for name in free.names if name not in known})
     runs = _runs(found.stretches, options.horizon)
     values = start.values
@@ -100,21 +100,12 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     starts = np.cumsum([0, *(run.last - run.first - 1 for run in runs)])[:-1]
     jacobian = answer.jacobian / scale
     covariance = sandwich_covariance(jacobian, answer.residual, np.ones(answer.residual.shape[0]), starts)
-    model = start.with_values(values, inverse_dynamics.standard_errors(free, covariance))
-    warnings, status = warnings_of(model, free, covariance)
+    trouble = ""
     if not answer.converged:
         remedy = "start nearer to the machine's values (--model), or shorten the runs (--horizon)"
-        status = f"not converged after {answer.iterations} steps; {remedy}"
-    return Identification(
-        model=model,
-        fitted=free.names,
-        covariance=covariance,
-        method=METHOD.id,
-        status=status,
-        warnings=(*messages, *warnings),
-        notes=found.notes,
-        train=score(model, records, options, found),
-    )
+        trouble = f"not converged after {answer.iterations} steps; {remedy}"
+    fitted = Fitted(start.with_values(values), free, covariance, begun.found, begun.messages)
+    return concluded(METHOD.id, fitted, records, options, trouble)
 
 
 METHOD = Method(

@@ -32,12 +32,11 @@ from ..model import Model
 from ..record import Array, Record
 from ..simulate import intervals, substeps
 from . import inverse_dynamics
+from .conclusion import Fitted, concluded, standard_errors
 from .equations import Equations, surroundings
 from .free_parameters import FreeParameters, candidates
 from .result import Identification, Method, Options
-from .scoring import score
 from .statistics import sandwich_covariance
-from .verdict import warnings_of
 
 __all__ = ["METHOD", "Run", "fit", "innovations", "runs_of"]
 
@@ -220,8 +219,9 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     Raises:
         IdentificationError: the recordings can't determine it.
     """
-    start, free, covariance, found, messages = inverse_dynamics.fit_force(structure, records, options)
-    known = inverse_dynamics.standard_errors(free, covariance)
+    begun = inverse_dynamics.fit_force(structure, records, options)
+    start, free, found = begun.model, begun.free, begun.found
+    known = standard_errors(free, begun.covariance)
     free = free.without({name for name in free.names if name not in known})
     runs = [run for record in records for run in runs_of(record)]
     free = free.within_reach(start, found)
@@ -231,20 +231,9 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     lengths = [run.effort.shape[0] - _SETTLING for run in runs]
     starts = np.cumsum([0, *lengths])[:-1]
     covariance = sandwich_covariance(jacobian, left, np.ones(left.shape[0]), starts)
-    model = start.with_values(values, inverse_dynamics.standard_errors(free, covariance))
-    warnings, status = warnings_of(model, free, covariance)
-    if not converged:
-        status = "not converged after 60 steps; start nearer to the machine's values (--model)"
-    return Identification(
-        model=model,
-        fitted=free.names,
-        covariance=covariance,
-        method=METHOD.id,
-        status=status,
-        warnings=(*messages, *warnings),
-        notes=found.notes,
-        train=score(model, records, options, found),
-    )
+    trouble = "" if converged else "not converged after 60 steps; start nearer to the machine's values (--model)"
+    fitted = Fitted(start.with_values(values), free, covariance, begun.found, begun.messages)
+    return concluded(METHOD.id, fitted, records, options, trouble)
 
 
 METHOD = Method(

@@ -12,7 +12,7 @@ from ..simulate import Predictor, simulate
 from .equations import Equations, Stretch, equations
 from .result import Options, Score
 
-__all__ = ["free_run", "score"]
+__all__ = ["force_along", "free_run", "score"]
 
 
 def score(model: Model, records: Sequence[Record], options: Options, found: Equations | None = None) -> Score:
@@ -29,20 +29,9 @@ def score(model: Model, records: Sequence[Record], options: Options, found: Equa
     """
     found = equations(list(records), options) if found is None else found
 
-    def along(stretch: Stretch) -> Array:
-        return Predictor(model).run(
-            stretch.time,
-            stretch.position,
-            stretch.velocity,
-            stretch.acceleration,
-            stretch.sample_time,
-            stretch.load,
-            stretch.temperature,
-        )[0]
-
     use = found.sliding
     force = found.force[use]
-    error = force - found.rows(along)[use]
+    error = force - found.rows(lambda stretch: force_along(model, stretch))[use]
     spread = force - float(np.mean(force))
     off = np.concatenate([free_run(model, stretch) - stretch.raw_position for stretch in found.stretches])
     return Score(
@@ -52,6 +41,20 @@ def score(model: Model, records: Sequence[Record], options: Options, found: Equa
         position_rmse=float(np.sqrt(np.mean(off**2))),
         n_samples=int(error.shape[0]),
     )
+
+
+def force_along(model: Model, stretch: Stretch) -> Array:
+    """Force that ``model`` needs along the motion of a stretch at full rate [F], shape ``(n,)``."""
+    effort, _ = Predictor(model).run(
+        stretch.time,
+        stretch.position,
+        stretch.velocity,
+        stretch.acceleration,
+        stretch.sample_time,
+        stretch.load,
+        stretch.temperature,
+    )
+    return effort
 
 
 def free_run(model: Model, stretch: Stretch) -> Array:

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..identification.equations import Equations, Stretch, equations
+from ..identification.equations import Equations, equations
 from ..identification.result import Identification, Options, Score
-from ..identification.scoring import free_run
+from ..identification.scoring import force_along, free_run
 from ..model import Model
 from ..model_file import model_to_text
 from ..record import Array, Record
-from ..simulate import Predictor, predict_force
+from ..simulate import predict_force
 from .figures import Curve, scatter_and_curves, stacked
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 
@@ -76,20 +76,8 @@ def _score_rows(result: Identification) -> list[tuple[str, ...]]:
     return rows
 
 
-def _along(model: Model, stretch: Stretch) -> Array:
-    return Predictor(model).run(
-        stretch.time,
-        stretch.position,
-        stretch.velocity,
-        stretch.acceleration,
-        stretch.sample_time,
-        stretch.load,
-        stretch.temperature,
-    )[0]
-
-
 def _force_section(name: str, model: Model, found: Equations) -> Section:
-    predicted = found.rows(lambda stretch: _along(model, stretch))
+    predicted = found.rows(lambda stretch: force_along(model, stretch))
     off = [free_run(model, stretch) - stretch.raw_position for stretch in found.stretches]
     units = model.units
     time = np.concatenate([stretch.time for stretch in found.stretches])
@@ -117,7 +105,7 @@ def _force_section(name: str, model: Model, found: Equations) -> Section:
 def _curve_section(model: Model, found: Equations) -> Section:
     static = [held for held in model.terms if held.effect.slip is None]
     inertial = model.with_terms(())
-    friction = found.force - found.rows(lambda stretch: _along(inertial, stretch))
+    friction = found.force - found.rows(lambda stretch: force_along(inertial, stretch))
     top = float(np.max(np.abs(found.velocity)))
     side = np.geomspace(1e-4 * top, top, 200)
     grid = np.concatenate([-side[::-1], side])
