@@ -18,7 +18,7 @@ from scipy import signal
 from ..record import Array, Mask, Record
 from .result import IdentificationError, Options
 
-__all__ = ["Equations", "Stretch", "equations", "surroundings"]
+__all__ = ["Equations", "Stretch", "at_rest", "equations", "surroundings"]
 
 _FILTER_ORDER = 4
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
@@ -137,7 +137,7 @@ def equations(records: list[Record], options: Options) -> Equations:
         band = min(cutoff, 0.4 * rate / decimation)
         noise = max(_velocity_noise(stretch, band) for stretch in stretches)
         rest = max(0.02 * float(np.quantile(np.abs(velocity), 0.98)), 4.0 * noise)
-    resting = [_at_rest(part, rest, decimation / rate) for part in np.split(velocity, starts[1:])]
+    resting = [at_rest(part, rest, decimation / rate) for part in np.split(velocity, starts[1:])]
     sliding = ~np.concatenate(resting)
     rest_time = float(np.sum(~sliding)) * decimation / rate
     if rest_time > 0:
@@ -163,7 +163,7 @@ def _velocity_noise(stretch: Stretch, band: float) -> float:
     return float((quiet + rounding) * 2.0 * np.pi * band**1.5 * np.sqrt(2.0 / 3.0 * stretch.sample_time))
 
 
-def _at_rest(velocity: Array, limit: float, row_time: float) -> Mask:
+def at_rest(velocity: Array, limit: float, row_time: float) -> Mask:
     """True where the joint stays slower than ``limit`` for a while; passing through zero at a reversal is no rest."""
     slow = np.abs(velocity) <= limit
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))

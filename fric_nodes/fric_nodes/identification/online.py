@@ -20,14 +20,15 @@ white-noise formula widened by the residuals' first autocorrelation stands in.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections import deque
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 
 from ..model import Model
 from ..record import Array, Mask, Record, RecordError
-from .equations import Equations, equations
+from .equations import Equations, at_rest, equations
 from .free_parameters import FreeParameters
 from .inverse_dynamics import regressors
 from .result import IdentificationError, Options
@@ -37,7 +38,9 @@ __all__ = ["Estimate", "OnlineIdentifier", "State"]
 _BLOCK_TIME = 0.5  # [s]
 _MIN_BLOCKS_PER_PARAMETER = 3
 _MOST_FORGOTTEN = 0.9  # of the information along one row, by that row
-_REST = 0.02  # of the fastest motion so far
+_REST = 0.02  # of the fastest motion, as offline
+_GROWN = 1.02  # growth of the rest limit from which the blocks kept are judged anew
+_BLOCKS_KEPT = 240
 
 
 class State(IntEnum):
@@ -77,6 +80,18 @@ class Estimate:
     status: str
 
 
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """The equations of one block: rows ``(n, n_parameters)``, the rest of shape ``(n,)``, and the two sample times [s]."""
+
+    rows: Array
+    target: Array
+    velocity: Array
+    sliding: Mask
+    row_time: float
+    sample_time: float
+
+
 class OnlineIdentifier:
     """Recursive estimator of the parameters in which a model's force is linear.
 
@@ -99,15 +114,20 @@ class OnlineIdentifier:
         self._free = FreeParameters.of(self.structure, self.options).only(True)
         n = len(self._free.names)
         self._values = self.structure.values[self._free.index]
+        self._forget(n)
+        self._blocks: deque[_Block] = deque(maxlen=_BLOCKS_KEPT)
+        self._rest = 0.0
+        self.samples_rejected = 0
+        self._clear_buffer()
+
+    def _forget(self, n: int) -> None:
+        """No information about the ``n`` parameters, whose values stay as they are."""
         self._information = np.zeros((n, n))
         self._scores = np.zeros((n, n))
         self._n_blocks = 0.0
         self._energy = self._lagged_energy = self._weight = 0.0
         self._last_residual = 0.0
-        self._fastest = 0.0
         self.samples_used = 0
-        self.samples_rejected = 0
-        self._clear_buffer()
 
     def _clear_buffer(self) -> None:
         self._time: list[float] = []
@@ -170,52 +190,63 @@ class OnlineIdentifier:
             record = Record(
                 time - time[0], np.array(self._position), np.array(self._effort), effort_hold="linear", source="joint states"
             )
-            found = self._equations(record)
+            found = equations([record], self.options)
         except (RecordError, IdentificationError):
             self._clear_buffer()
             return False
-        learnt = self._learn(found)
-        row_time = float(found.time[1] - found.time[0])
         sample_time = record.sample_time
+        learnt = self._learn(found, sample_time)
+        row_time = float(found.time[1] - found.time[0])
         edge = round(float(found.time[0]) / sample_time)
         done = round(found.time.shape[0] * row_time / sample_time)
-        self.samples_used += int(np.sum(found.sliding)) * round(row_time / sample_time)
         keep_from = min(done, len(self._time) - edge)
         for samples in (self._time, self._position, self._effort):
             del samples[:keep_from]
         return learnt
 
-    def _equations(self, record: Record) -> Equations:
-        """The block's equations, with rest measured by the fastest motion so far, of which a block knows only its part."""
-        found = equations([record], self.options)
-        if self.options.rest_velocity is not None:
-            return found
-        self._fastest = max(self._fastest, float(np.quantile(np.abs(found.velocity), 0.98)))
-        rest = _REST * self._fastest
-        return found if rest <= found.rest_velocity else equations([record], replace(self.options, rest_velocity=rest))
-
-    def _learn(self, found: Equations) -> bool:
+    def _learn(self, found: Equations, sample_time: float) -> bool:
+        """Learn from a block; and again from those before it, when it shows that what they held was rest."""
         columns = regressors(self.structure, found)
         held = np.where([p.declaration.linear for p in self.structure.parameters()], self.structure.values, 0.0)
         held[self._free.index] = 0.0
-        target = found.force - columns @ held
-        rows = columns[:, self._free.index]
         row_time = float(found.time[1] - found.time[0])
-        forgetting = math.exp(-row_time / self.forgetting_time) if math.isfinite(self.forgetting_time) else 1.0
-        score = np.zeros(rows.shape[1])
+        block = _Block(
+            columns[:, self._free.index], found.force - columns @ held, found.velocity, found.sliding, row_time, sample_time
+        )
+        self._blocks.append(block)
+        rest = self._rest_limit()
+        if rest > _GROWN * self._rest:
+            self._rest = rest
+            self._forget(len(self._free.names))
+            learnt = [self._learn_block(earlier, rest) for earlier in self._blocks]
+        else:
+            learnt = [self._learn_block(block, rest)]
+        if not learnt[-1]:
+            # A long rest must not push out what tells how slow rest is.
+            self._blocks.pop()
+        return any(learnt)
+
+    def _rest_limit(self) -> float:
+        """Speed below which the joint may be at rest [x/s]: slow beside the fastest motion of the blocks kept."""
+        if self.options.rest_velocity is not None:
+            return self.options.rest_velocity
+        return _REST * float(np.quantile(np.abs(np.concatenate([block.velocity for block in self._blocks])), 0.98))
+
+    def _learn_block(self, block: _Block, rest: float) -> bool:
+        """Learn from the rows of ``block`` that are not slower than ``rest`` for a while."""
+        forgetting = math.exp(-block.row_time / self.forgetting_time) if math.isfinite(self.forgetting_time) else 1.0
+        score = np.zeros(block.rows.shape[1])
         n_learnt = 0
-        for phi, force, sliding in zip(rows, target, found.sliding, strict=True):
-            if not sliding or abs(float(phi @ phi)) == 0.0:
-                continue
-            residual = self._update(phi, float(force), forgetting)
-            score += phi * residual
-            n_learnt += 1
+        sliding = block.sliding & ~at_rest(block.velocity, rest, block.row_time)
+        for phi, force in zip(block.rows[sliding], block.target[sliding], strict=True):
+            if float(phi @ phi) > 0.0:
+                score += phi * self._update(phi, float(force), forgetting)
+                n_learnt += 1
+        self.samples_used += n_learnt * round(block.row_time / block.sample_time)
         if n_learnt:
             fade = forgetting**n_learnt
             self._scores = fade * self._scores + np.outer(score, score)
             self._n_blocks = fade * self._n_blocks + 1.0
-            # As old information does, so that one wild block doesn't make everything else a rest.
-            self._fastest *= fade
         return n_learnt > 0
 
     def _update(self, phi: Array, force: float, forgetting: float) -> float:
