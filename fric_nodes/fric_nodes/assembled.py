@@ -6,14 +6,72 @@ called here.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from .effect import Context
 
-__all__ = ["RIGID", "drive", "force", "level", "level_sum", "slip", "step", "unpacked"]
+__all__ = [
+    "ACCELERATION",
+    "MEMORY",
+    "RIGID",
+    "SEEN",
+    "SEEN_RATE",
+    "Inner",
+    "Surroundings",
+    "command",
+    "drive",
+    "force",
+    "level",
+    "level_sum",
+    "link",
+    "own",
+    "play",
+    "prepare",
+    "remember",
+    "slip",
+    "step",
+    "uncommand",
+    "unpacked",
+]
 
 RIGID = True
 """True when no term has slip dynamics of its own, so that the contact sticks exactly."""
+
+ACCELERATION = False
+"""True when a term depends on the sign of the acceleration."""
+
+MEMORY = False
+"""True when a term of the contact has memory."""
+
+SEEN = 0
+"""Index of the state that the sensor reports as position."""
+
+SEEN_RATE = 1
+"""Index of the state that the sensor reports as velocity."""
+
+
+class Inner(NamedTuple):
+    """The inner states of the terms.
+
+    Attributes:
+        z: states of the slip dynamics, shape ``(n_states,)``.
+        z_next: where a step writes them, shape ``(2 n_states,)``; the second half is work space.
+        memory: states of the terms with memory, shape ``(n_memory,)``.
+        constants: what terms have derived from their parameters, shape ``(n_constants,)``.
+    """
+
+    z: Any
+    z_next: Any
+    memory: Any
+    constants: Any
+
+
+class Surroundings(NamedTuple):
+    """What surrounds a step: time at its start [s], relative normal load [1], difference from the reference temperature [K]."""
+
+    time: float
+    load: float
+    temperature: float
 
 
 def level(c: Context, p: Any) -> float:
@@ -22,29 +80,62 @@ def level(c: Context, p: Any) -> float:
 
 
 def level_sum(c: Context, p: Any) -> float:
-    """Sum of the slip levels [F] as it is; linear in the linear parameters."""
+    """Slip level of all terms [F] as it is; linear in the linear parameters."""
     raise AssertionError("a stand-in, see the module")
 
 
 def force(c: Context, p: Any) -> float:
-    """Force of all terms at the place ``force`` [F], positive against positive motion."""
+    """Force of all terms that have one [F], positive against positive motion."""
     raise AssertionError("a stand-in, see the module")
 
 
-def slip(z: Any, z_next: Any, v: float, h: float, level: float, p: Any) -> float:
+def slip(z: Any, z_next: Any, v: float, h: float, level: float, constants: Any, p: Any) -> float:
     """Mean friction force [F] of the slip dynamics over a step, which leads ``z`` to ``z_next``."""
     raise AssertionError("a stand-in, see the module")
 
 
-def step(
-    p: Any, x: Any, x_next: Any, z: Any, z_next: Any, u: float, h: float, t: float, load: float, temperature: float
-) -> float:
+def command(u: float, h: float, memory: Any, p: Any) -> float:
+    """Mean force [F] of the actuator over a step of ``h`` [s] when it is told to give ``u``."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def uncommand(f: float, p: Any) -> float:
+    """Command [F] that makes the memoryless part of the command path give the force ``f``."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def play(p: Any) -> float:
+    """Free play of the transmission [x]."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def link(e_0: float, e_1: float, h: float, p: Any) -> float:
+    """Mean force [F] that the transmission passes on over a step in which the motor's lead goes from ``e_0`` to ``e_1``."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def remember(c: Context, p: Any) -> None:
+    """Lead the memory of all terms over the step of which ``c`` is the middle."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def prepare(p: Any, constants: Any) -> None:
+    """Write the constants that terms derive from their parameters."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def own(c: Context, p: Any) -> float:
+    """The plant's own force at the contact (gravity, a spring) [F], positive against positive motion."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def step(p: Any, x: Any, x_next: Any, s: Inner, u: float, h: float, around: Surroundings) -> float:
     """One step of the plant."""
     raise AssertionError("a stand-in, see the module")
 
 
 def drive(p: Any, q: float, v: float, a: float) -> float:
-    """Force that moves the plant against nothing but its inertia [F]."""
+    """Force that moves the plant against nothing but its inertia and its own force [F]."""
     raise AssertionError("a stand-in, see the module")
 
 

@@ -77,7 +77,7 @@ class SimulatedAxis:
             if len(self._substeps) < 64:
                 self._substeps[duration] = n_substeps
         self._simulator.run(np.array([limited]), duration, n_substeps)
-        self._impulse += limited * duration
+        self._impulse += self._simulator.applied * duration
         self._elapsed += duration
 
     def measure(self) -> Measurement:

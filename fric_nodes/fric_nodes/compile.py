@@ -36,28 +36,33 @@ from . import loops
 from .effect import Effect
 from .kernel import kernel
 from .plant import Plant
+from .record import Array
 
 __all__ = ["Loops", "loops_for"]
 
-
-_LOOPS = (loops.simulate, loops.predict, loops.observe)
+# What the texts of plants and loops may name besides the model's own functions.
+_IMPORTS = (
+    "import math",
+    "from typing import Any",
+    "from fric_nodes.assembled import Inner, Surroundings",
+    "from fric_nodes.effect import Context",
+    "from fric_nodes.kernel import kernel, loop",
+)
 
 
 @dataclass(frozen=True)
 class Loops:
-    """Compiled loops of one model structure; arguments as in :mod:`fric_nodes.loops`.
+    """Compiled loops of one model structure; arguments as in :mod:`fric_nodes.loops`, without the work space.
 
     Attributes:
         simulate: motion from force.
         predict: force from motion.
         observe: one-step prediction along measured positions.
-        n_friction_states: number of states of the slip dynamics.
     """
 
     simulate: Callable[..., None]
     predict: Callable[..., None]
     observe: Callable[..., None]
-    n_friction_states: int
 
 
 def loops_for(plant: Plant, effects: Sequence[Effect]) -> Loops:
@@ -68,70 +73,151 @@ def loops_for(plant: Plant, effects: Sequence[Effect]) -> Loops:
 @lru_cache(maxsize=256)
 def _loops_for(plant: Plant, effects: tuple[Effect, ...]) -> Loops:
     source = _source(plant, effects)
-    module = _import(source, _fingerprint(effects, source))
-    n_states = sum(effect.n_states for effect in effects)
-    sizes = len(plant.states), 2 * n_states
-    return Loops(
-        _with_work_space(module.simulate, sizes),
-        _with_work_space(module.predict, sizes),
-        _with_work_space(module.observe, sizes),
-        n_states,
-    )
+    module = _import(source, _fingerprint(plant, effects, source))
+    n_constants = _counter(plant, effects)
+    names = [function.__name__ for function in loops.LOOPS]
+    return Loops(*(_with_work_space(getattr(module, name), len(plant.states), n_constants) for name in names))
 
 
-def _with_work_space(loop: Callable[..., None], sizes: tuple[int, int]) -> Callable[..., None]:
-    """``loop`` with ``x_next`` and ``z_next``, its last arguments, made anew for each call, so that threads don't meet."""
+def _counter(plant: Plant, effects: tuple[Effect, ...]) -> Callable[[Array], int]:
+    """Function that gives the number of constants for the values of a model."""
+    if not any(callable(effect.n_constants) for effect in effects):
+        fixed = sum(effect.constants(()) for effect in effects)
+        return lambda values: fixed
 
-    def call(*arguments: object) -> None:
-        loop(*arguments, np.empty(sizes[0]), np.empty(sizes[1]))
+    def count(values: Array) -> int:
+        at = len(plant.parameters)
+        total = 0
+        for effect in effects:
+            total += effect.constants([float(value) for value in values[at : at + len(effect.parameters)]])
+            at += len(effect.parameters)
+        return total
+
+    return count
+
+
+def _with_work_space(loop: Callable[..., None], n_states: int, n_constants: Callable[[Array], int]) -> Callable[..., None]:
+    """``loop`` with its work space, the last arguments, made anew for each call, so that threads don't meet."""
+    parameters = list(inspect.signature(getattr(loop, "py_func", loop)).parameters)
+    z = parameters.index("z")
+
+    def call(*arguments: Any) -> None:
+        work = np.empty(n_states), np.empty(2 * arguments[z].shape[0]), np.zeros(n_constants(arguments[0]))
+        loop(*arguments, *work)
 
     return call
 
 
+class _Assembly:
+    """The bodies of a model's functions, grown effect by effect; see :mod:`fric_nodes.assembled` for what each is."""
+
+    def __init__(self, at: int) -> None:
+        self.imports: list[str] = list(_IMPORTS)
+        self.level: list[str] = []
+        self.force: list[str] = []
+        self.remember: list[str] = []
+        self.slip = "    return 0.0"
+        self.command: list[str] = []
+        self.uncommand: list[str] = []
+        self.play: list[str] = []
+        self.prepare: list[str] = []
+        self._at = at
+        self._memory = 0
+        self._constants: list[str] = []
+
+    def add(self, number: int, effect: Effect) -> None:
+        """Add the effect that is the model's term ``number``."""
+        parameters = [f"p[{self._at + k}]" for k in range(len(effect.parameters))]
+        self._at += len(parameters)
+        for role, function in effect.functions.items():
+            self.imports.append(f"from {function.__module__} import {function.__name__} as {role}_{number}")
+
+        def call(role: str, *first: str) -> str:
+            return f"{role}_{number}({', '.join((*first, *parameters))})"
+
+        kept = (str(self._memory),) if effect.n_memory else ()
+        if effect.remember is not None:
+            self.remember.append(f"    {call('remember', 'c', 'total' if effect.level else '0.0', *kept)}")
+        if effect.level is not None:
+            line = f"    total = {call('level', 'c', 'total', *kept)}"
+            self.level.append(line)
+            self.remember.append(line)
+        if effect.force is not None:
+            self.force.append(f"    total += {call('force', 'c', *kept)}")
+        if effect.command is not None:
+            self.command.append(f"    u = {call('command', 'u', 'h', 'memory', str(self._memory))}")
+        if effect.uncommand is not None:
+            self.uncommand.insert(0, f"    f = {call('uncommand', 'f')}")
+        if effect.play is not None:
+            self.play.append(f"    total += {call('play')}")
+        constants = self._prepare(call) if effect.prepare is not None else ()
+        if effect.slip is not None:
+            self.slip = f"    return {call('slip', 'z', 'z_next', '0', 'v', 'h', 'level', *constants)}"
+        self._memory += effect.n_memory
+
+    def _prepare(self, call: Callable[..., str]) -> tuple[str, str]:
+        # At most one term has constants, since only slip dynamics take them: its offset is 0.
+        self.prepare.append(f"    {call('prepare', 'constants', '0')}")
+        return "constants", "0"
+
+
+def _links(effects: tuple[Effect, ...], at: int) -> list[str]:
+    """The lines that add up the links of the transmission; those of terms with play only where there are no others."""
+    lines: dict[bool, list[str]] = {False: [], True: []}
+    for number, effect in enumerate(effects):
+        parameters = "".join(f", p[{at + k}]" for k in range(len(effect.parameters)))
+        at += len(effect.parameters)
+        if effect.link is not None:
+            lines[effect.play is not None].append(f"    total += link_{number}(e_0, e_1, h, free{parameters})")
+    return lines[False] or lines[True]
+
+
 def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
     """Text of the module that binds the structure's functions together."""
-    imports = [
-        "from typing import Any",
-        "from fric_nodes.effect import Context",
-        "from fric_nodes.kernel import kernel, loop",
-    ]
-    level, force, slip = ["    total = 0.0"], ["    total = 0.0"], ["    return 0.0"]
-    at = len(plant.parameters)
-    state = 0
+    parts = _Assembly(len(plant.parameters))
     for number, effect in enumerate(effects):
-        values = "".join(f", p[{at + k}]" for k in range(len(effect.parameters)))
-        at += len(effect.parameters)
-        for role in ("level", "force", "slip"):
-            function = getattr(effect, role)
-            if function is not None:
-                imports.append(f"from {function.__module__} import {function.__name__} as {role}_{number}")
-        if effect.level is not None:
-            level.append(f"    total = level_{number}(c, total{values})")
-        if effect.force is not None:
-            force.append(f"    total += force_{number}(c{values})")
-        if effect.slip is not None:
-            slip = [f"    return slip_{number}(z, z_next, {state}, v, h, level{values})"]
-            state += effect.n_states
+        parts.add(number, effect)
+    n_parameters = len(plant.parameters) + sum(len(effect.parameters) for effect in effects)
     lines = [
         f'"""Assembled for: {plant.id} | {", ".join(effect.key for effect in effects) or "no terms"}."""',
-        *imports,
+        *parts.imports,
         f"RIGID = {all(effect.slip is None for effect in effects)}",
+        f"ACCELERATION = {any(effect.uses_acceleration for effect in effects)}",
+        f"MEMORY = {any(effect.remember is not None for effect in effects)}",
+        f"SEEN, SEEN_RATE = {plant.encoder}",
         "@kernel\ndef unpacked(p):",
-        f"    return ({''.join(f'p[{k}], ' for k in range(at))})",
-        "@kernel\ndef level_sum(c, p):",
-        *level,
-        "    return total",
+        f"    return ({''.join(f'p[{k}], ' for k in range(n_parameters))})",
+        *_summing("level_sum(c, p)", parts.level),
         "@kernel\ndef level(c, p):",
         "    return max(level_sum(c, p), 0.0)",
-        "@kernel\ndef force(c, p):",
-        *force,
+        *_summing("force(c, p)", parts.force),
+        *_summing("play(p)", parts.play),
+        "@kernel\ndef link(e_0, e_1, h, p):",
+        "    total = 0.0",
+        "    free = play(p)",
+        *_links(effects, len(plant.parameters)),
         "    return total",
-        "@kernel\ndef slip(z, z_next, v, h, level, p):",
-        *slip,
+        *_summing("remember(c, p)", parts.remember),
+        "@kernel\ndef slip(z, z_next, v, h, level, constants, p):",
+        parts.slip,
+        "@kernel\ndef command(u, h, memory, p):",
+        *parts.command,
+        "    return u",
+        "@kernel\ndef uncommand(f, p):",
+        *parts.uncommand,
+        "    return f",
+        "@kernel\ndef prepare(p, constants):",
+        *(parts.prepare or ["    pass"]),
         *(inspect.getsource(_plain(function)) for function in plant.functions),
-        *("@loop\n" + inspect.getsource(function) for function in _LOOPS),
+        inspect.getsource(_plain(loops.advance)),
+        *("@loop\n" + inspect.getsource(function) for function in loops.LOOPS),
     ]
     return "\n".join(lines)
+
+
+def _summing(head: str, body: list[str]) -> list[str]:
+    """A function that starts from ``total = 0.0``, lets each line of ``body`` change it, and returns it."""
+    return [f"@kernel\ndef {head}:", "    total = 0.0", *body, "    return total"]
 
 
 def _plain(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -139,12 +225,16 @@ def _plain(function: Callable[..., Any]) -> Callable[..., Any]:
     return cast(Callable[..., Any], getattr(function, "py_func", function))
 
 
-def _fingerprint(effects: tuple[Effect, ...], source: str) -> str:
-    """Hash of all that the machine code depends on."""
+def _fingerprint(plant: Plant, effects: tuple[Effect, ...], source: str) -> str:
+    """Hash of all that the machine code depends on: the text, and every module whose compiled functions it calls."""
     digest = hashlib.sha256()
-    modules = {Effect.__module__, kernel.__module__}
-    for effect in effects:
-        modules |= {f.__module__ for f in (effect.level, effect.force, effect.slip) if f is not None}
+    modules = {Effect.__module__, kernel.__module__, loops.__name__}
+    waiting = {f.__module__ for effect in effects for f in effect.functions.values()}
+    while waiting:
+        name = waiting.pop()
+        modules.add(name)
+        compiled = [held for held in vars(sys.modules[name]).values() if hasattr(held, "py_func")]
+        waiting |= {f.py_func.__module__ for f in compiled} - modules
     for name in sorted(modules):
         digest.update(inspect.getsource(sys.modules[name]).encode())
     for part in (source, numba.__version__, np.__version__, platform.python_version(), platform.machine()):

@@ -4,7 +4,7 @@ A model is a plant and a list of terms, each term an effect with values. Terms d
 the jump of Coulomb friction, a load dependence scales it), so an effect says at which :class:`Place` it acts and the model is
 assembled in a fixed order. The same place names the component in a diagnosis.
 
-An effect lives in a file of its own in ``effects/`` and offers up to three compiled functions, all written once and used by
+An effect lives in a file of its own in ``effects/`` and offers one or more compiled functions, all written once and used by
 the simulator, the predictor, the regressors and the compensator alike:
 
 ``level(c, base, *p) -> float``
@@ -14,9 +14,26 @@ the simulator, the predictor, the regressors and the compensator alike:
     a force that opposes positive motion when positive [F];
 ``slip(z, z_next, i, v, h, level, *p) -> float``
     the mean friction force [F] over a step of ``h`` [s] at the constant velocity ``v`` [x/s] that leads the states
-    ``z[i:]`` to ``z_next[i:]``, where sliding friction would be ``level`` [F].
+    ``z[i:]`` to ``z_next[i:]``, where sliding friction would be ``level`` [F];
+``command(u, h, y, i, *p) -> float``
+    the mean force [F] over a step of ``h`` [s] that an actuator gives when it is told to give ``u``; leads its states
+    ``y[i:]`` on;
+``uncommand(f, *p) -> float``
+    the command [F] that makes a memoryless command path give the force ``f``;
+``play(*p) -> float``
+    free play of a transmission [x];
+``link(e_0, e_1, h, free, *p) -> float``
+    the mean force [F] that a transmission passes on over a step of ``h`` [s] in which the motor gets ahead of the load by
+    ``e_1`` instead of ``e_0`` [x], with the play ``free`` [x] of all terms. Links of several terms add up; the link of a term
+    that has play counts only where no other term has a link.
 
 ``c`` is a :class:`Context`; ``*p`` are the effect's parameters in the order of their declaration.
+
+An effect with memory (a lag, the age of a contact, a resonator) has ``n_memory`` states in ``c.memory``, which live as long as
+the model runs. Its ``level`` and ``force`` take the offset ``i`` of its states before ``*p`` and only read them, since a step
+evaluates them several times; ``remember(c, base, i, *p)`` leads them on when the step is done, with ``c`` its middle.
+An effect that derives constants from its parameters writes ``n_constants`` of them with ``prepare(k, j, *p)`` once per run; its
+``slip`` then takes the array ``k`` and the offset ``j`` before ``*p``.
 """
 
 from __future__ import annotations
@@ -26,7 +43,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from .parameter import Parameter
+from .record import Array
 
 __all__ = ["Context", "Effect", "Place"]
 
@@ -43,7 +63,7 @@ class Place(Enum):
 
 
 class Context(NamedTuple):
-    """What an effect may look at, for one instant of one contact.
+    """What an effect may look at, for one instant of one contact, or for the middle of one step.
 
     Attributes:
         position: [x].
@@ -52,6 +72,9 @@ class Context(NamedTuple):
         time: [s].
         load: normal load relative to nominal [1].
         temperature: difference from the reference temperature [K].
+        acceleration: [x/s^2]; only its sign, and only for effects with ``uses_acceleration``; 0 otherwise.
+        step: length of the step of which this is the middle [s]; 0 for an instant.
+        memory: states of all terms with memory, shape ``(n_memory,)``, at the start of the step.
     """
 
     position: float
@@ -60,9 +83,13 @@ class Context(NamedTuple):
     time: float
     load: float
     temperature: float
+    acceleration: float
+    step: float
+    memory: Any
 
 
 Compiled = Callable[..., float]
+Count = int | Callable[..., int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +104,22 @@ class Effect:
         equation: plain-text equation.
         source: paper and equation number.
         parameters: in the order in which the compiled functions take them.
-        level: see the module's docstring; None when the effect doesn't contribute there.
+        order: within its place, what comes first: 0 what adds up, 10 what lags, 20 what depends on direction, 30 what scales
+            the rest.
+        level: see the module's docstring, as for all compiled functions; None when the effect doesn't contribute there.
         force: as ``level``.
         slip: as ``level``; at most one term of a model may have it.
-        n_states: number of internal states of ``slip``.
+        command: as ``level``.
+        uncommand: as ``level``.
+        play: as ``level``.
+        link: as ``level``.
+        remember: as ``level``; for effects with memory.
+        prepare: as ``level``; for effects with constants.
+        n_states: number of internal states of ``slip``, or a function of the values.
+        initial: the states of ``slip`` at the start of a run, from the values; None: zeros.
+        n_memory: number of states in the memory.
+        n_constants: number of constants, or a function of the values.
+        uses_acceleration: True when it depends on the sign of the acceleration.
         rate: fastest rate [1/s] of the effect on a body of the given mass, from ``(mass, *values)``; sets the step. None: slow.
         regime: where in a recording the effect shows.
         looks_like: other effects with a similar trace, each with the experiment that tells them apart.
@@ -94,10 +133,21 @@ class Effect:
     source: str
     parameters: tuple[Parameter, ...]
     law: str = ""
+    order: int = 0
     level: Compiled | None = None
     force: Compiled | None = None
     slip: Compiled | None = None
-    n_states: int = 0
+    command: Compiled | None = None
+    uncommand: Compiled | None = None
+    play: Compiled | None = None
+    link: Compiled | None = None
+    remember: Callable[..., None] | None = None
+    prepare: Callable[..., None] | None = None
+    n_states: Count = 0
+    initial: Callable[..., Array] | None = None
+    n_memory: int = 0
+    n_constants: Count = 0
+    uses_acceleration: bool = False
     rate: Callable[..., float] | None = None
     regime: str = ""
     looks_like: Mapping[str, str] = field(default_factory=dict)
@@ -108,6 +158,22 @@ class Effect:
         """``id`` or ``id/law``: unique in the registry."""
         return f"{self.id}/{self.law}" if self.law else self.id
 
+    @property
+    def functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Its compiled functions by their role."""
+        roles = ("level", "force", "slip", "command", "uncommand", "play", "link", "remember", "prepare")
+        return {role: getattr(self, role) for role in roles if getattr(self, role) is not None}
+
     def values(self, given: Mapping[str, Any]) -> Sequence[float]:
         """The parameters' values in order, defaults filled in; KeyError when one without default is missing."""
         return [float(given[p.name]) if p.name in given or p.default is None else p.default for p in self.parameters]
+
+    def start(self, values: Sequence[float]) -> Array:
+        """The states of ``slip`` at the start of a run with these ``values``, shape ``(n_states,)``."""
+        if self.initial is not None:
+            return self.initial(*values)
+        return np.zeros(self.n_states(*values) if callable(self.n_states) else self.n_states)
+
+    def constants(self, values: Sequence[float]) -> int:
+        """Number of constants for these ``values``."""
+        return self.n_constants(*values) if callable(self.n_constants) else self.n_constants

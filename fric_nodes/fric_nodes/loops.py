@@ -1,77 +1,122 @@
 """The compiled loops of every model: motion from force, force from motion, and motion followed sample by sample.
 
 They are written once, over the names of :mod:`fric_nodes.assembled`, and compiled for each structure by
-:mod:`fric_nodes.compile`, which also hands in ``x_next`` and ``z_next``, the work space of a step.
+:mod:`fric_nodes.compile`, which also hands in the work space of a step, the last arguments.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from .assembled import RIGID, drive, force, level_sum, slip, step, unpacked
+from .assembled import (
+    MEMORY,
+    RIGID,
+    SEEN,
+    SEEN_RATE,
+    Inner,
+    Surroundings,
+    command,
+    drive,
+    force,
+    level_sum,
+    prepare,
+    remember,
+    slip,
+    step,
+    uncommand,
+    unpacked,
+)
 from .effect import Context
+from .kernel import kernel
 
-__all__ = ["observe", "predict", "simulate"]
+__all__ = ["LOOPS", "advance", "observe", "predict", "simulate"]
+
+
+@kernel
+def advance(p: Any, x: Any, x_next: Any, s: Inner, u: float, h: float, around: Surroundings) -> float:
+    """One step of the plant and of what its terms remember; ``x`` and ``s.z`` are led on in place."""
+    q, v = x[0], x[1]
+    friction = step(p, x, x_next, s, u, h, around)
+    for j in range(x.shape[0]):
+        x[j] = x_next[j]
+    if not RIGID:
+        for j in range(s.z.shape[0]):
+            s.z[j] = s.z_next[j]
+    if MEMORY:
+        w = (x[0] - q) / h
+        change = x[1] - v
+        bend = 1.0 if change > 0.0 else (-1.0 if change < 0.0 else 0.0)
+        direction = -1.0 if w < 0.0 else 1.0
+        remember(
+            Context(0.5 * (q + x[0]), w, direction, around.time + 0.5 * h, around.load, around.temperature, bend, h, s.memory),
+            p,
+        )
+    return friction
 
 
 def simulate(
-    p: Any, u: Any, h: float, n_sub: int, t_0: float, load: Any, temperature: Any, x: Any, z: Any,
-    x_out: Any, friction_out: Any, x_next: Any, z_next: Any,
+    p: Any, u: Any, h: float, n_sub: int, t_0: float, load: Any, temperature: Any, x: Any, z: Any, memory: Any,
+    x_out: Any, friction_out: Any, applied_out: Any, x_next: Any, z_next: Any, constants: Any,
 ) -> None:  # fmt: skip
-    """Lead the states ``x`` and ``z``, in place, over ``len(u)`` intervals of length ``h`` [s] in ``n_sub`` steps each.
+    """Lead the states ``x``, ``z`` and ``memory``, in place, over ``len(u)`` intervals of ``h`` [s] in ``n_sub`` steps each.
 
-    ``u[k]`` acts over the whole interval k. ``x_out[k]`` is the mechanical state at the end of interval k and
-    ``friction_out[k]`` the contact's mean friction force [F] over it. ``load`` and ``temperature`` hold one value, or one
-    for each interval.
+    ``u[k]`` is commanded over the whole interval k. ``x_out[k]`` is the mechanical state at the end of interval k,
+    ``friction_out[k]`` the contact's mean friction force [F] over it and ``applied_out[k]`` the mean of what comes out of the
+    command path. ``load`` and ``temperature`` hold one value, or one for each interval.
     """
+    prepare(p, constants)
     p = unpacked(p)
+    s = Inner(z, z_next, memory, constants)
     h_sub = h / n_sub
     for k in range(u.shape[0]):
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
         total = 0.0
+        applied = 0.0
         for m in range(n_sub):
-            t = t_0 + k * h + m * h_sub
-            total += step(p, x, x_next, z, z_next, u[k], h_sub, t, load_k, temperature_k)
-            for j in range(x.shape[0]):
-                x[j] = x_next[j]
-            if not RIGID:
-                for j in range(z.shape[0]):
-                    z[j] = z_next[j]
+            around = Surroundings(t_0 + k * h + m * h_sub, load_k, temperature_k)
+            given = command(u[k], h_sub, memory, p)
+            applied += given
+            total += advance(p, x, x_next, s, given, h_sub, around)
         for j in range(x.shape[0]):
             x_out[k, j] = x[j]
         friction_out[k] = total / n_sub
+        applied_out[k] = applied / n_sub
 
 
 def predict(
-    p: Any, t: Any, q: Any, v: Any, a: Any, h: float, load: Any, temperature: Any, z: Any, u_out: Any, friction_out: Any,
-    x_next: Any, z_next: Any,
+    p: Any, t: Any, q: Any, v: Any, a: Any, h: float, load: Any, temperature: Any, z: Any, memory: Any, u_out: Any,
+    friction_out: Any, x_next: Any, z_next: Any, constants: Any,
 ) -> None:  # fmt: skip
     """Force that the model needs for the motion ``q``, ``v``, ``a`` at each sample, all of shape ``(n_samples,)``.
 
     Slip dynamics are led from half a step before each sample to half a step after it at the sample's velocity, so that the mean
-    force over the step belongs to the sample itself and no half step of delay creeps in. ``z`` is led on in place.
+    force over the step belongs to the sample itself and no half step of delay creeps in. ``z`` and ``memory`` are led on in
+    place.
     """
+    prepare(p, constants)
     p = unpacked(p)
     for k in range(q.shape[0]):
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
         direction = 1.0 if v[k] > 0.0 else (-1.0 if v[k] < 0.0 else 0.0)
-        c = Context(q[k], v[k], direction, t[k], load_k, temperature_k)
+        c = Context(q[k], v[k], direction, t[k], load_k, temperature_k, a[k], h, memory)
         if RIGID:
             friction = direction * level_sum(c, p)
         else:
-            friction = slip(z, z_next, v[k], h, level_sum(c, p), p)
+            friction = slip(z, z_next, v[k], h, level_sum(c, p), constants, p)
             for j in range(z.shape[0]):
                 z[j] = z_next[j]
         friction_out[k] = friction
-        u_out[k] = drive(p, q[k], v[k], a[k]) + force(c, p) + friction
+        u_out[k] = uncommand(drive(p, q[k], v[k], a[k]) + force(c, p) + friction, p)
+        if MEMORY:
+            remember(c, p)
 
 
 def observe(
     p: Any, u: Any, y: Any, h: Any, n_sub: int, load: Any, temperature: Any,
-    alpha: float, beta: float, noise: float, x: Any, z: Any, innovation: Any,
-    x_next: Any, z_next: Any,
+    alpha: float, beta: float, noise: float, x: Any, z: Any, memory: Any, innovation: Any,
+    x_next: Any, z_next: Any, constants: Any,
 ) -> None:  # fmt: skip
     """Follow the measured positions ``y``: predict each from the state before it, then correct position and velocity.
 
@@ -79,22 +124,24 @@ def observe(
     the constant gains of an alpha-beta filter. A contact that sticks exactly is left at rest while the innovation stays within
     three times ``noise`` [x]: the noise of an encoder must not shake it loose.
     """
+    prepare(p, constants)
     p = unpacked(p)
+    s = Inner(z, z_next, memory, constants)
     t = 0.0
     for k in range(u.shape[0]):
         h_sub = h[k] / n_sub
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
         for m in range(n_sub):
-            step(p, x, x_next, z, z_next, u[k], h_sub, t + m * h_sub, load_k, temperature_k)
-            for j in range(x.shape[0]):
-                x[j] = x_next[j]
-            if not RIGID:
-                for j in range(z.shape[0]):
-                    z[j] = z_next[j]
-        e = y[k] - x[0]
+            around = Surroundings(t + m * h_sub, load_k, temperature_k)
+            advance(p, x, x_next, s, command(u[k], h_sub, memory, p), h_sub, around)
+        e = y[k] - x[SEEN]
         innovation[k] = e
-        x[0] += alpha * e
-        if not (RIGID and x[1] == 0.0 and abs(e) <= 3.0 * noise):
-            x[1] += beta * e / h[k]
+        x[SEEN] += alpha * e
+        if not (RIGID and x[SEEN_RATE] == 0.0 and abs(e) <= 3.0 * noise):
+            x[SEEN_RATE] += beta * e / h[k]
         t += h[k]
+
+
+LOOPS = (simulate, predict, observe)
+"""The loops, in the order of :class:`fric_nodes.compile.Loops`."""

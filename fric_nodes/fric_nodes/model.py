@@ -141,9 +141,21 @@ class Model:
         return replace(self, terms=_in_order(terms), standard_errors={})
 
     @property
+    def mechanics(self) -> Plant:
+        """The bodies that move: the plant, or, behind a transmission, its driven form."""
+        if self.plant.driven is not None and any(held.effect.link is not None for held in self.terms):
+            return self.plant.driven
+        return self.plant
+
+    @property
     def loops(self) -> Loops:
         """The compiled loops of this structure; the first call in a fresh cache compiles."""
-        return loops_for(self.plant, [held.effect for held in self.terms])
+        return loops_for(self.mechanics, [held.effect for held in self.terms])
+
+    def inner_states(self) -> tuple[Array, Array]:
+        """States of the slip dynamics and memory of all terms at the start of a run."""
+        slip = [held.effect.start(held.values) for held in self.terms if held.effect.slip is not None]
+        return slip[0] if slip else np.zeros(0), np.zeros(sum(held.effect.n_memory for held in self.terms))
 
     @property
     def has_slip_dynamics(self) -> bool:
@@ -151,9 +163,12 @@ class Model:
         return any(held.effect.slip is not None for held in self.terms)
 
     def max_rate(self) -> float:
-        """Fastest rate of the model's terms on the moving mass [1/s]; 0 when nothing is fast."""
-        inertia = self.plant.inertia(*self.plant_values)
+        """Fastest rate of the plant and of the model's terms on its mass [1/s]; 0 when nothing is fast."""
+        mechanics = self.mechanics
+        inertia = mechanics.inertia(*self.plant_values)
         rates = [held.effect.rate(inertia, *held.values) for held in self.terms if held.effect.rate is not None]
+        if mechanics.rate is not None:
+            rates.append(mechanics.rate(*self.plant_values))
         return max(rates, default=0.0)
 
 
@@ -192,7 +207,7 @@ def build_model(plant: str, plant_values: Mapping[str, float], terms: Iterable[T
 
 def _in_order(terms: Iterable[Term]) -> tuple[Term, ...]:
     places = list(Place)
-    return tuple(sorted(terms, key=lambda held: places.index(held.effect.place)))
+    return tuple(sorted(terms, key=lambda held: (places.index(held.effect.place), held.effect.order)))
 
 
 def _check_structure(model: Model) -> None:
@@ -200,6 +215,12 @@ def _check_structure(model: Model) -> None:
     laws = [held.effect for held in model.terms if held.effect.slip is not None]
     if len(laws) > 1:
         raise ModelError("model", f"two terms with slip dynamics ({laws[0].key}, {laws[1].key})", "keep one of them")
+    if model.plant.driven is None:
+        for held in model.terms:
+            if held.effect.link is not None or held.effect.play is not None:
+                able = ", ".join(plant.id for plant in PLANTS.values() if plant.driven is not None)
+                problem = f"plant '{model.plant.id}' has no transmission for '{held.effect.id}'"
+                raise ModelError("model", problem, f"leave the term out or use one of the plants {able or '(none)'}")
     seen: set[str] = set()
     for held in model.terms:
         if held.effect.id in seen and not held.effect.repeatable:

@@ -30,11 +30,15 @@ class Motion:
         position: [x].
         velocity: [x/s].
         friction: contact's mean friction force over the interval that ends at the sample [F], 0 at the first.
+        applied: what came out of the command path, mean over the interval that ends at the sample; 0 at the first.
+        states: all mechanical states, shape ``(n_samples, n_states)``.
     """
 
     position: Array
     velocity: Array
     friction: Array
+    applied: Array
+    states: Array
 
 
 def intervals(effort: Array, hold: str) -> Array:
@@ -60,32 +64,41 @@ def substeps(model: Model, sample_time: float, step_of_rate: float = _STEP_OF_RA
 
 
 class Simulator:
-    """A model in motion, step by step; ``friction_state`` holds the states of its slip dynamics, ``(n_friction_states,)``.
+    """A model in motion, step by step.
 
     Args:
         model: what moves.
-        position: start [x].
+        position: start [x], as the sensor sees it.
         velocity: start [x/s].
+
+    Attributes:
+        states: the plant's, shape ``(n_states,)``.
+        friction_state: of the slip dynamics, shape ``(n_friction_states,)``.
+        memory: of the terms that have one, shape ``(n_memory,)``.
+        applied: what came out of the command path in the last interval, its mean [F].
+        time: [s].
     """
 
     def __init__(self, model: Model, position: float = 0.0, velocity: float = 0.0) -> None:
         self._loops = model.loops
         self._values = model.values
         self._model = model
-        self._state = np.zeros(len(model.plant.states))
-        self._state[:2] = position, velocity
-        self.friction_state = np.zeros(self._loops.n_friction_states)
+        self._encoder = model.mechanics.encoder
+        plant_values = np.array(model.plant_values)
+        self.states = np.ascontiguousarray(model.mechanics.start(plant_values, position, velocity), dtype=np.float64)
+        self.friction_state, self.memory = model.inner_states()
+        self.applied = 0.0
         self.time = 0.0
 
     @property
     def position(self) -> float:
-        """[x]."""
-        return float(self._state[0])
+        """As the sensor sees it [x]."""
+        return float(self.states[self._encoder[0]])
 
     @property
     def velocity(self) -> float:
-        """[x/s]."""
-        return float(self._state[1])
+        """As the sensor sees it [x/s]."""
+        return float(self.states[self._encoder[1]])
 
     def run(
         self,
@@ -95,20 +108,35 @@ class Simulator:
         load: Array = _NOMINAL_LOAD,
         temperature: Array = _NOMINAL_TEMPERATURE,
     ) -> tuple[Array, Array]:
-        """Lead the model over ``len(effort)`` intervals of ``sample_time`` [s], each under its constant force [F].
+        """Lead the model over ``len(effort)`` intervals of ``sample_time`` [s], each under its constant command [F].
 
         Returns:
             States at the end of each interval, shape ``(n_intervals, n_states)``, and mean friction force, ``(n_intervals,)``.
         """
+        states, friction, _ = self.follow(effort, sample_time, n_substeps, load, temperature)
+        return states, friction
+
+    def follow(
+        self,
+        effort: Array,
+        sample_time: float,
+        n_substeps: int | None = None,
+        load: Array = _NOMINAL_LOAD,
+        temperature: Array = _NOMINAL_TEMPERATURE,
+    ) -> tuple[Array, Array, Array]:
+        """As :meth:`run`, and what came out of the command path over each interval, ``(n_intervals,)``."""
         n_substeps = substeps(self._model, sample_time) if n_substeps is None else n_substeps
-        states = np.empty((effort.shape[0], self._state.shape[0]))
+        states = np.empty((effort.shape[0], self.states.shape[0]))
         friction = np.empty(effort.shape[0])
+        applied = np.empty(effort.shape[0])
         self._loops.simulate(
             self._values, np.ascontiguousarray(effort), sample_time, n_substeps, self.time, load, temperature,
-            self._state, self.friction_state, states, friction,
+            self.states, self.friction_state, self.memory, states, friction, applied,
         )  # fmt: skip
         self.time += effort.shape[0] * sample_time
-        return states, friction
+        if applied.size:
+            self.applied = float(applied[-1])
+        return states, friction, applied
 
     def step(self, effort: float, duration: float) -> float:
         """Lead the model over ``duration`` [s] under the constant force ``effort`` [F]; mean friction force [F]."""
@@ -141,18 +169,22 @@ def simulate(
         load: normal load relative to nominal, one value or one per interval.
         temperature: difference from the reference temperature [K], one value or one per interval.
     """
-    states, friction = Simulator(model, position, velocity).run(
-        intervals(effort, hold), sample_time, n_substeps, load, temperature
-    )
+    simulator = Simulator(model, position, velocity)
+    start = simulator.states.copy()
+    states, friction, applied = simulator.follow(intervals(effort, hold), sample_time, n_substeps, load, temperature)
+    states = np.vstack([start, states])
+    q, v = model.mechanics.encoder
     return Motion(
-        position=np.concatenate([[position], states[:, 0]]),
-        velocity=np.concatenate([[velocity], states[:, 1]]),
+        position=states[:, q].copy(),
+        velocity=states[:, v].copy(),
         friction=np.concatenate([[0.0], friction]),
+        applied=np.concatenate([[0.0], applied]),
+        states=states,
     )
 
 
 class Predictor:
-    """The force that a model needs along a motion; ``friction_state`` is kept from call to call.
+    """The force that a model needs along a motion; ``friction_state`` and ``memory`` are kept from call to call.
 
     Args:
         model: what is to be moved.
@@ -161,7 +193,7 @@ class Predictor:
     def __init__(self, model: Model) -> None:
         self._loops = model.loops
         self._values = model.values
-        self.friction_state = np.zeros(self._loops.n_friction_states)
+        self.friction_state, self.memory = model.inner_states()
 
     def run(
         self,
@@ -178,7 +210,7 @@ class Predictor:
         friction = np.empty(position.shape[0])
         self._loops.predict(
             self._values, time, position, velocity, acceleration, sample_time, load, temperature,
-            self.friction_state, effort, friction,
+            self.friction_state, self.memory, effort, friction,
         )  # fmt: skip
         return effort, friction
 

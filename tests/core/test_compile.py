@@ -111,6 +111,6 @@ def test_parameters_reach_the_term_they_belong_to() -> None:
         loops = loops_for(held.plant, [each.effect for each in held.terms])
         effort, friction = np.empty(1), np.empty(1)
         one = np.ones(1)
-        loops.predict(held.values, one, one, one, one, 1e-3, one, 0.0 * one, np.zeros(0), effort, friction)
+        loops.predict(held.values, one, one, one, one, 1e-3, one, 0.0 * one, np.zeros(0), np.zeros(0), effort, friction)
         assert effort[0] == 1.2 * 1.0 + 10.0 * 1.0 + 0.5
         assert friction[0] == 0.0

@@ -41,7 +41,7 @@ def values(effect: Effect) -> tuple[float, ...]:
 
 
 def context(velocity: float, direction: float | None = None) -> Context:
-    return Context(0.1, velocity, direction or math.copysign(1.0, velocity), 2.0, 1.0, 0.0)
+    return Context(0.1, velocity, direction or math.copysign(1.0, velocity), 2.0, 1.0, 0.0, 0.0, 0.0, np.zeros(0))
 
 
 def test_every_module_of_the_folder_is_in_the_catalogue() -> None:

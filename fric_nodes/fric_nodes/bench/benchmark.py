@@ -16,7 +16,7 @@ class Figure:
         name: what was measured.
         value: in ``unit``.
         unit: such as ``s`` or ``samples/s``.
-        goal: the number it is meant to reach, with ``<=`` or ``>=`` in front; empty when there is none.
+        goal: the number it is meant to reach, with ``<=``, ``>=`` or ``==`` in front; empty when there is none.
     """
 
     name: str
@@ -30,7 +30,7 @@ class Figure:
         if not self.goal:
             return None
         relation, _, limit = self.goal.partition(" ")
-        return self.value <= float(limit) if relation == "<=" else self.value >= float(limit)
+        return {"<=": self.value <= float(limit), ">=": self.value >= float(limit), "==": self.value == float(limit)}[relation]
 
 
 @dataclass(frozen=True, eq=False)

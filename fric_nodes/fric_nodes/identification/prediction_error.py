@@ -114,15 +114,15 @@ def runs_of(record: Record) -> list[Run]:
 
 def innovations(model: Model, run: Run, index: float) -> Array:
     """Measured minus predicted position at each sample but the first ones [x]."""
-    state = np.zeros(len(model.plant.states))
-    state[:2] = run.start
+    mechanics = model.mechanics
+    state = np.ascontiguousarray(mechanics.start(np.array(model.plant_values), *run.start), dtype=np.float64)
     loops = model.loops
     found = np.empty(run.effort.shape[0])
     alpha, beta = _gains(index)
     n_steps = substeps(model, float(np.median(run.step)), _STEP_OF_RATE)
     loops.observe(
         model.values, run.effort, run.position, run.step, n_steps, run.load, run.temperature, alpha, beta, run.noise,
-        state, np.zeros(loops.n_friction_states), found,
+        state, *model.inner_states(), found,
     )  # fmt: skip
     return found[_SETTLING:]
 
