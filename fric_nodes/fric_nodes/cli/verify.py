@@ -1,0 +1,64 @@
+"""``fric verify``: hold the physics against papers, closed forms and conservation laws, and write it all on a page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from .options import JsonOption, progress
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to ``app``."""
+    app.command("verify", epilog="Example: fric verify --out verification.html")(verify)
+
+
+def verify(
+    names: Annotated[list[str] | None, typer.Argument(help="Which verifications; all when none is named.")] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write.")] = Path("verification.html"),
+    as_json: JsonOption = False,
+) -> None:
+    """Verify the physics; exit status 1 when a goal is missed."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from ..files import write_text
+    from ..report.verification import number, verification_page
+    from ..verification import VERIFICATIONS
+
+    chosen = names or list(VERIFICATIONS)
+    for name in chosen:
+        if name not in VERIFICATIONS:
+            raise InputError("fric verify", f"no verification '{name}'", f"choose from {', '.join(VERIFICATIONS)}")
+    found = []
+    for name in chosen:
+        progress(f"verifying {VERIFICATIONS[name].title}")
+        found.append((VERIFICATIONS[name], VERIFICATIONS[name].run()))
+    write_text(out, verification_page(found))
+    figures = [(check.id, figure) for check, evidence in found for figure in evidence.figures]
+    if as_json:
+        typer.echo(
+            json.dumps(
+                [
+                    {"verification": at, "name": f.name, "value": f.value, "unit": f.unit, "goal": f.goal, "reached": f.reached}
+                    for at, f in figures
+                ]
+            )
+        )
+    else:
+        table = Table(box=None, pad_edge=False)
+        for column in ("verification", "figure", "found", "goal"):
+            table.add_column(column, justify="right" if column == "found" else "left")
+        for at, f in figures:
+            mark = "" if f.reached is None else " reached" if f.reached else " missed"
+            table.add_row(at, f.name, f"{number(f.value)} {f.unit}", f"{f.goal} {f.unit}{mark}" if f.goal else "")
+        Console(highlight=False).print(table)
+        typer.echo(f"written: {out}")
+    if any(f.reached is False for _, f in figures):
+        raise typer.Exit(1)
