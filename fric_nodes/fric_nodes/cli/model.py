@@ -1,8 +1,9 @@
-"""``fric model``: the schema of model files, and what a model file says."""
+"""``fric model``: the schema of model files, what a model file says, and the catalogues that it draws on."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -13,10 +14,12 @@ __all__ = ["register"]
 
 def register(app: typer.Typer) -> None:
     """Add the verb to ``app``."""
-    verbs = typer.Typer(no_args_is_help=True, help="Look at model files: schema, show, effects.")
+    verbs = typer.Typer(no_args_is_help=True, help="Look at model files, and at what they can hold.")
     verbs.command("schema", epilog="Example: fric model schema > fric-model.json")(schema)
     verbs.command("show", no_args_is_help=True, epilog="Example: fric model show config/demo_axis.yaml")(show)
-    verbs.command("effects", epilog="Example: fric model effects")(effects)
+    verbs.command("effects", epilog="Example: fric model effects presliding")(effects)
+    verbs.command("plants", epilog="Example: fric model plants")(plants)
+    verbs.command("excitations", epilog="Example: fric model excitations")(excitations)
     app.add_typer(verbs, name="model")
 
 
@@ -74,16 +77,70 @@ def show(
     console.print(table)
 
 
-def effects() -> None:
+def effects(
+    names: Annotated[list[str] | None, typer.Argument(help="Which effects, with all there is to know; all in short.")] = None,
+) -> None:
     """List the effects that a model can hold."""
+    from ..effects import EFFECTS
+    from ..errors import InputError
+    from ..parameter import Parameter
+    from ..record import Units
+
+    if not names:
+        _list(
+            ("effect", "place", "equation", "parameters"),
+            ((key, e.place.value, e.equation, ", ".join(p.name for p in e.parameters)) for key, e in EFFECTS.items()),
+        )
+        return
+
+    def described(parameter: Parameter) -> str:
+        least = max(parameter.lower, 0.0) if parameter.positive else parameter.lower
+        bounds = f"{'(' if parameter.positive else '['}{least:g}, {parameter.upper:g}]"
+        default = "" if parameter.default is None else f", default {parameter.default:g}"
+        head = f"    {parameter.name}  {parameter.symbol} [{parameter.unit(Units())}]"
+        return f"{head} in {bounds}{default}: {parameter.doc}"
+
+    for name in names:
+        chosen = [effect for effect in EFFECTS.values() if name in (effect.id, effect.key)]
+        if not chosen:
+            known = ", ".join(dict.fromkeys(effect.id for effect in EFFECTS.values()))
+            raise InputError("fric model effects", f"no effect '{name}'", f"choose from {known}")
+        for effect in chosen:
+            typer.echo(f"{effect.key}: {effect.title} ({effect.place.value})\n  {effect.equation}\n  source: {effect.source}")
+            typer.echo("\n".join(described(parameter) for parameter in effect.parameters))
+            typer.echo(f"  shows in: {effect.regime}")
+            for other, experiment in effect.looks_like.items():
+                typer.echo(f"  looks like {other}: {experiment}")
+            typer.echo()
+
+
+def plants() -> None:
+    """List the plants that a model can have."""
+    from ..plants import PLANTS
+
+    _list(
+        ("plant", "equation", "source", "measures besides"),
+        ((key, p.equation, p.source, ", ".join(signal.name for signal in p.signals)) for key, p in PLANTS.items()),
+    )
+
+
+def excitations() -> None:
+    """List the excitations that the node ``excitation`` can run."""
+    from ..excitation import EXCITATIONS
+
+    _list(
+        ("excitation", "shows", "parameters"),
+        ((key, e.shows, ", ".join(p.name for p in e.parameters)) for key, e in EXCITATIONS.items()),
+    )
+
+
+def _list(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from ..effects import EFFECTS
-
     table = Table(box=None, pad_edge=False)
-    for name in ("effect", "place", "equation", "parameters"):
-        table.add_column(name)
-    for key, effect in EFFECTS.items():
-        table.add_row(key, effect.place.value, effect.equation, ", ".join(p.name for p in effect.parameters))
-    Console(highlight=False).print(table)
+    for name in head:
+        table.add_column(name, overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    Console(highlight=False, markup=False).print(table)
