@@ -104,6 +104,7 @@ class Effect:
         equation: plain-text equation.
         source: paper and equation number.
         parameters: in the order in which the compiled functions take them.
+        usual: True for the law that is meant when a model names none; without one it is the first by file name.
         order: within its place, what comes first: 0 what adds up, 10 what lags, 20 what depends on direction, 30 what scales
             the rest.
         level: see the module's docstring, as for all compiled functions; None when the effect doesn't contribute there.
@@ -133,6 +134,7 @@ class Effect:
     source: str
     parameters: tuple[Parameter, ...]
     law: str = ""
+    usual: bool = False
     order: int = 0
     level: Compiled | None = None
     force: Compiled | None = None

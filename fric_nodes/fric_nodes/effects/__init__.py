@@ -15,7 +15,8 @@ EFFECTS: dict[str, Effect] = {effect.key: effect for effect in discover(__name__
 
 
 def by_name(effect: str, law: str = "") -> Effect | None:
-    """The effect ``effect`` in the form ``law``; without a law the one form there is, or the first by file name."""
+    """The effect ``effect`` in the form ``law``; without a law the usual form, or else the first by file name."""
     if law:
         return EFFECTS.get(f"{effect}/{law}")
-    return next((found for found in EFFECTS.values() if found.id == effect), None)
+    laws = [found for found in EFFECTS.values() if found.id == effect]
+    return next((found for found in laws if found.usual), laws[0] if laws else None)

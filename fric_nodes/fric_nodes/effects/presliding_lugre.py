@@ -53,6 +53,7 @@ def _rate(mass: float, stiffness: float, damping: float) -> float:
 EFFECT = Effect(
     id="presliding",
     law="lugre",
+    usual=True,
     place=Place.SLIP_DYNAMICS,
     title="pre-sliding displacement",
     equation="F = sigma_0 z + sigma_1 dz/dt, dz/dt = v - sigma_0 |v| z / g(v)",
