@@ -52,12 +52,14 @@ def simulate(
 
     from .. import simulate as simulation
     from ..bagio.write import write_record
+    from ..identification.equations import surroundings
     from ..model_file import read_model
 
     held = read_model(model)
     record = read_all([force], ReadOptions(joint, repair, time, start, end, tuple(topic or ())))[0].uniform()
     n_first = min(5, record.n_samples)
     velocity = float(np.polyfit(record.time[:n_first], record.position[:n_first], 1)[0]) if n_first > 1 else 0.0
+    load, temperature = (each[:-1] if each.shape[0] > 1 else each for each in surroundings(record))
     motion = simulation.simulate(
         held,
         record.effort,
@@ -65,6 +67,8 @@ def simulate(
         position=float(record.position[0]),
         velocity=velocity,
         hold=record.effort_hold,
+        load=load,
+        temperature=temperature,
     )
     error = float(np.sqrt(np.mean((motion.position - record.position) ** 2)))
     simulated = replace(
