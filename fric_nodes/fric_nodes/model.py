@@ -55,6 +55,7 @@ class Model:
         terms: in the order of assembly (by place).
         joint: name of the joint the model belongs to.
         units: units of position and force.
+        nominal: the ``normal_load`` and the ``temperature`` [degC] at which the values hold, where known.
         standard_errors: standard error of identified parameters, by parameter name.
         provenance: where the values come from, free text by key.
     """
@@ -64,6 +65,7 @@ class Model:
     terms: tuple[Term, ...]
     joint: str = "axis"
     units: Units = field(default_factory=Units)
+    nominal: Mapping[str, float] = field(default_factory=dict)
     standard_errors: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
 

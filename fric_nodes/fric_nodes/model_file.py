@@ -38,6 +38,12 @@ class _UnitsEntry(BaseModel):
     force: str = Field(min_length=1)
 
 
+class _NominalEntry(BaseModel):
+    model_config = _STRICT
+    normal_load: Annotated[float, Field(gt=0)] | None = None
+    temperature: float | None = None
+
+
 class _Header(BaseModel):
     """Everything of a file but the parts that depend on the plant and the effects."""
 
@@ -47,6 +53,7 @@ class _Header(BaseModel):
     units: _UnitsEntry
     plant: dict[str, Any]
     terms: list[dict[str, Any]]
+    nominal: _NominalEntry = Field(default_factory=_NominalEntry)
     standard_errors: dict[str, Annotated[float, Field(ge=0)]] = {}
     provenance: dict[str, str] = {}
 
@@ -159,6 +166,7 @@ def model_from_text(text: str, source: str = "model") -> Model:
             terms,
             joint=header.joint,
             units=Units(header.units.position, header.units.force),
+            nominal=header.nominal.model_dump(exclude_none=True),
             standard_errors=header.standard_errors,
             provenance=header.provenance,
         )
@@ -251,6 +259,8 @@ def model_to_text(model: Model) -> str:
     if not model.terms:
         terms.fa.set_flow_style()
     root["terms"] = terms
+    if model.nominal:
+        root["nominal"] = CommentedMap({name: float(value) for name, value in model.nominal.items()})
     if model.standard_errors:
         root["standard_errors"] = CommentedMap({name: float(error) for name, error in model.standard_errors.items()})
     if model.provenance:

@@ -48,6 +48,7 @@ class Record:
         velocity: as recorded [m/s or rad/s], or None when the source has none.
         reference: position wanted [m or rad], or None.
         extra: further signals by name (``normal_load`` [N], ``temperature`` [degC], ...).
+        nominal: what ``normal_load`` and ``temperature`` are seen relative to; their means where not given.
         valid: False where a sample must not be used (gap, saturation, end stop); None means all are good.
         joint: name of the joint.
         units: units of position and force.
@@ -63,6 +64,7 @@ class Record:
     velocity: Array | None = None
     reference: Array | None = None
     extra: Mapping[str, Array] = field(default_factory=dict)
+    nominal: Mapping[str, float] = field(default_factory=dict)
     valid: Mask | None = None
     joint: str = "axis"
     units: Units = field(default_factory=Units)

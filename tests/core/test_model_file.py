@@ -42,6 +42,7 @@ def whole() -> Model:
         joint="x: 1",
         units=Units("rad", "N m"),
         standard_errors=errors,
+        nominal={"normal_load": 120.0, "temperature": 21.5},
         provenance={"bag": "a#b: 'c'"},
     )
 

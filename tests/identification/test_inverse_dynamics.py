@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from fric_nodes.identification import METHODS
+from fric_nodes.identification.equations import nominal_conditions, surroundings
 from fric_nodes.identification.result import Identification, IdentificationError, Options
 from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.record import Record
+from fric_nodes.record import Record, RecordError
 from scipy import signal
 
 FIT = METHODS["inverse-dynamics"].fit
@@ -210,3 +211,20 @@ def test_a_cutoff_outside_the_band_is_refused(slider: Any, cutoff: float) -> Non
 def test_a_recording_that_is_too_short_is_refused(slider: Any) -> None:
     with pytest.raises(IdentificationError, match="record for longer"):
         FIT(structure(), [slider.record().slice(0, 60)], Options())
+
+
+def test_what_a_load_is_relative_to_is_the_model_s_and_not_each_recording_s() -> None:
+    time = np.arange(200) * 1e-3
+    records = [
+        Record(time, 0.0 * time, 0.0 * time, extra={"normal_load": np.full(200, load), "temperature": np.full(200, 20.0)})
+        for load in (80.0, 120.0)
+    ]
+    nominal = nominal_conditions(records)
+    assert nominal == {"normal_load": 100.0, "temperature": 20.0}
+    load, temperature = surroundings(records[1])
+    assert load[0] == 1.0
+    load, temperature = surroundings(replace(records[1], nominal=nominal | {"temperature": 15.0}))
+    assert load[0] == pytest.approx(1.2)
+    assert temperature[0] == 5.0
+    with pytest.raises(RecordError, match="mean of 'normal_load' is 0"):
+        nominal_conditions([replace(records[0], extra={"normal_load": 0.0 * time})])

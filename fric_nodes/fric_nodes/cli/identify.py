@@ -83,6 +83,7 @@ def identify(
     as_json: JsonOption = False,
 ) -> None:
     """Identify a model's parameters from recordings and write model.yaml, identification.json and report.html."""
+    from ..identification.equations import nominal_conditions
     from ..identification.result import Options
 
     _check(cutoff, decimation, rest_velocity, horizon)
@@ -94,6 +95,9 @@ def identify(
     records = read_all(train, reading)
     validation = read_all(kept_apart, reading)
     structure = _structure(model, terms, records[0])
+    # What a load or a temperature is relative to belongs to the model: a recording under another load has another mean.
+    structure = replace(structure, nominal=nominal_conditions(records) | dict(structure.nominal))
+    records, validation = ([replace(each, nominal=structure.nominal) for each in held] for held in (records, validation))
     progress(f"fitting {', '.join(structure.names)} by {method}")
     result = _fit(method, structure, records, validation, options)
     summary = _summary(result)

@@ -57,6 +57,7 @@ def simulate(
 
     held = read_model(model)
     record = read_all([force], ReadOptions(joint, repair, time, start, end, tuple(topic or ())))[0].uniform()
+    record = replace(record, nominal=held.nominal)
     n_first = min(5, record.n_samples)
     velocity = float(np.polyfit(record.time[:n_first], record.position[:n_first], 1)[0]) if n_first > 1 else 0.0
     load, temperature = (each[:-1] if each.shape[0] > 1 else each for each in surroundings(record))

@@ -8,17 +8,17 @@ of Gautier 1997).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy import signal
 
-from ..record import Array, Mask, Record
+from ..record import Array, Mask, Record, RecordError
 from .result import IdentificationError, Options
 
-__all__ = ["Equations", "Stretch", "at_rest", "equations", "surroundings"]
+__all__ = ["Equations", "Stretch", "at_rest", "equations", "nominal_conditions", "surroundings"]
 
 _FILTER_ORDER = 4
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
@@ -217,10 +217,27 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
 
 
 def surroundings(record: Record) -> tuple[Array, Array]:
-    """Normal load relative to its mean, and temperature less its mean [K]; one value each where not recorded, else ``(n,)``."""
+    """Normal load relative to nominal, and temperature less nominal [K]; one value each where not recorded, else ``(n,)``."""
+    nominal = nominal_conditions([record]) | dict(record.nominal)
     load = record.extra.get("normal_load")
     temperature = record.extra.get("temperature")
     return (
-        np.ones(1) if load is None else np.ascontiguousarray(load) / float(np.mean(load)),
-        np.zeros(1) if temperature is None else np.ascontiguousarray(temperature) - float(np.mean(temperature)),
+        np.ones(1) if load is None else np.ascontiguousarray(load) / nominal["normal_load"],
+        np.zeros(1) if temperature is None else np.ascontiguousarray(temperature) - nominal["temperature"],
     )
+
+
+def nominal_conditions(records: Sequence[Record]) -> dict[str, float]:
+    """Mean normal load and mean temperature over ``records``, those that were recorded.
+
+    Raises:
+        RecordError: the mean load is zero, so that nothing can be relative to it.
+    """
+    found = {}
+    for name in ("normal_load", "temperature"):
+        signals = [record.extra[name] for record in records if name in record.extra]
+        if signals:
+            found[name] = float(np.mean(np.concatenate(signals)))
+    if found.get("normal_load") == 0.0:
+        raise RecordError(records[0].source, "the mean of 'normal_load' is 0", "leave the signal out, or correct its offset")
+    return found
