@@ -30,7 +30,8 @@ class Figure:
         if not self.goal:
             return None
         relation, _, limit = self.goal.partition(" ")
-        return {"<=": self.value <= float(limit), ">=": self.value >= float(limit), "==": self.value == float(limit)}[relation]
+        value = float(self.value)
+        return {"<=": value <= float(limit), ">=": value >= float(limit), "==": value == float(limit)}[relation]
 
 
 @dataclass(frozen=True, eq=False)

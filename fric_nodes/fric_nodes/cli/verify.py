@@ -25,9 +25,6 @@ def verify(
     as_json: JsonOption = False,
 ) -> None:
     """Verify the physics; exit status 1 when a goal is missed."""
-    from rich.console import Console
-    from rich.table import Table
-
     from ..files import write_text
     from ..report.verification import number, verification_page
     from ..verification import VERIFICATIONS
@@ -52,13 +49,13 @@ def verify(
             )
         )
     else:
-        table = Table(box=None, pad_edge=False)
-        for column in ("verification", "figure", "found", "goal"):
-            table.add_column(column, justify="right" if column == "found" else "left")
-        for at, f in figures:
-            mark = "" if f.reached is None else " reached" if f.reached else " missed"
-            table.add_row(at, f.name, f"{number(f.value)} {f.unit}", f"{f.goal} {f.unit}{mark}" if f.goal else "")
-        Console(highlight=False).print(table)
+        for check, evidence in found:
+            with_goal = [f for f in evidence.figures if f.reached is not None]
+            typer.echo(f"{check.id}: {sum(f.reached is True for f in with_goal)} of {len(with_goal)} goals reached")
+            for f in evidence.figures:
+                if names or f.reached is False:
+                    mark = "" if f.reached is None else f"  ({f.goal}: {'reached' if f.reached else 'MISSED'})"
+                    typer.echo(f"  {f.name}: {number(f.value)} {f.unit}{mark}")
         typer.echo(f"written: {out}")
     if any(f.reached is False for _, f in figures):
         raise typer.Exit(1)
