@@ -7,7 +7,7 @@ A model is immutable; a fit makes a new one with :meth:`Model.with_values`. Para
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -50,7 +50,7 @@ class Model:
     """A plant and its terms.
 
     Attributes:
-        plant: kind of plant.
+        plant: kind of plant; its driven form where the terms hold a transmission.
         plant_values: values of the plant's own parameters.
         terms: in the order of assembly (by place).
         joint: name of the joint the model belongs to.
@@ -140,19 +140,15 @@ class Model:
 
     def with_terms(self, terms: Iterable[Term]) -> Model:
         """The same plant with other terms; standard errors are dropped, since they belonged to the old structure."""
-        return replace(self, terms=_in_order(terms), standard_errors={})
-
-    @property
-    def mechanics(self) -> Plant:
-        """The bodies that move: the plant, or, behind a transmission, its driven form."""
-        if self.plant.driven is not None and any(held.effect.link is not None for held in self.terms):
-            return self.plant.driven
-        return self.plant
+        ordered = _in_order(terms)
+        plant = _form(PLANTS[self.plant.id], ordered)
+        values = _plant_values(plant, {p.name: v for p, v in zip(self.plant.parameters, self.plant_values, strict=True)})
+        return replace(self, plant=plant, plant_values=values, terms=ordered, standard_errors={})
 
     @property
     def loops(self) -> Loops:
         """The compiled loops of this structure; the first call in a fresh cache compiles."""
-        return loops_for(self.mechanics, [held.effect for held in self.terms])
+        return loops_for(self.plant, [held.effect for held in self.terms])
 
     def inner_states(self) -> tuple[Array, Array]:
         """States of the slip dynamics and memory of all terms at the start of a run."""
@@ -166,11 +162,10 @@ class Model:
 
     def max_rate(self) -> float:
         """Fastest rate of the plant and of the model's terms on its mass [1/s]; 0 when nothing is fast."""
-        mechanics = self.mechanics
-        inertia = mechanics.inertia(*self.plant_values)
+        inertia = self.plant.inertia(*self.plant_values)
         rates = [held.effect.rate(inertia, *held.values) for held in self.terms if held.effect.rate is not None]
-        if mechanics.rate is not None:
-            rates.append(mechanics.rate(*self.plant_values))
+        if self.plant.rate is not None:
+            rates.append(self.plant.rate(*self.plant_values))
         return max(rates, default=0.0)
 
 
@@ -201,10 +196,40 @@ def term(effect: str, law: str = "", **values: float) -> Term:
 
 
 def build_model(plant: str, plant_values: Mapping[str, float], terms: Iterable[Term] = (), **rest: object) -> Model:
-    """A model by names, for code: ``build_model("rigid", {"mass": 1.2}, [term("coulomb", force=4.0)])``."""
-    kind = PLANTS[plant]
-    values = tuple(float(plant_values[parameter.name]) for parameter in kind.parameters)
-    return Model(kind, values, _in_order(terms), **rest)  # type: ignore[arg-type]
+    """A model by names, for code: ``build_model("rigid", {"mass": 1.2}, [term("coulomb", force=4.0)])``.
+
+    Raises:
+        ModelError: unknown plant or value, a value is missing, or the terms can't stand together.
+    """
+    if plant not in PLANTS:
+        raise ModelError("model", f"unknown plant '{plant}'", f"use one of {', '.join(PLANTS)}")
+    ordered = _in_order(terms)
+    kind = _form(PLANTS[plant], ordered)
+    known = {parameter.name for parameter in kind.parameters}
+    for name in plant_values:
+        if name not in known:
+            problem = f"plant '{plant}' has no '{name}'"
+            if kind.driven is not None and name in {parameter.name for parameter in kind.driven.parameters}:
+                problem = f"'{name}' of plant '{plant}' has no meaning without a transmission"
+            raise ModelError("model", problem, f"use {', '.join(parameter.name for parameter in kind.parameters)}")
+    return Model(kind, _plant_values(kind, plant_values), ordered, **rest)  # type: ignore[arg-type]
+
+
+def _form(plant: Plant, terms: Sequence[Term]) -> Plant:
+    """The plant itself, or its driven form where the terms hold a transmission and there is such a form."""
+    transmitted = any(held.effect.link is not None or held.effect.play is not None for held in terms)
+    return plant.driven if transmitted and plant.driven is not None else plant
+
+
+def _plant_values(plant: Plant, given: Mapping[str, float]) -> tuple[float, ...]:
+    """The plant's values in order, defaults filled in."""
+    values = []
+    for parameter in plant.parameters:
+        value = given.get(parameter.name, parameter.default)
+        if value is None:
+            raise ModelError("model", f"'{parameter.name}' of plant '{plant.id}' is missing", f"give {parameter.doc}")
+        values.append(float(value))
+    return tuple(values)
 
 
 def _in_order(terms: Iterable[Term]) -> tuple[Term, ...]:
@@ -217,7 +242,7 @@ def _check_structure(model: Model) -> None:
     laws = [held.effect for held in model.terms if held.effect.slip is not None]
     if len(laws) > 1:
         raise ModelError("model", f"two terms with slip dynamics ({laws[0].key}, {laws[1].key})", "keep one of them")
-    if model.plant.driven is None:
+    if PLANTS[model.plant.id].driven is None:
         for held in model.terms:
             if held.effect.link is not None or held.effect.play is not None:
                 able = ", ".join(plant.id for plant in PLANTS.values() if plant.driven is not None)

@@ -94,7 +94,7 @@ def _plant_entries() -> dict[str, type[BaseModel]]:
     entries = {}
     for plant in PLANTS.values():
         fields: dict[str, Any] = {"type": (Literal[plant.id], ...)}
-        fields |= {parameter.name: _field(parameter) for parameter in plant.parameters}
+        fields |= {parameter.name: _field(parameter) for parameter in (plant.driven or plant).parameters}
         doc = f"{plant.title}: {plant.equation} ({plant.source})"
         entries[plant.id] = create_model(f"plant_{plant.id}", __config__=_STRICT, __doc__=doc, **fields)
     return entries
@@ -158,7 +158,7 @@ def model_from_text(text: str, source: str = "model") -> Model:
         entry = _validated(entry_type, raw, tree, at, source)
         assert effect is not None
         terms.append(Term(effect, tuple(float(getattr(entry, p.name)) for p in effect.parameters)))
-    plant_values = {p.name: float(getattr(plant_entry, p.name)) for p in PLANTS[header.plant["type"]].parameters}
+    plant_values = {name: float(getattr(plant_entry, name)) for name in plant_entry.model_fields_set - {"type"}}
     try:
         model = build_model(
             header.plant["type"],

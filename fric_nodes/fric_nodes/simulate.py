@@ -83,9 +83,9 @@ class Simulator:
         self._loops = model.loops
         self._values = model.values
         self._model = model
-        self._encoder = model.mechanics.encoder
+        self._encoder = model.plant.encoder
         plant_values = np.array(model.plant_values)
-        self.states = np.ascontiguousarray(model.mechanics.start(plant_values, position, velocity), dtype=np.float64)
+        self.states = np.ascontiguousarray(model.plant.start(plant_values, position, velocity), dtype=np.float64)
         self.friction_state, self.memory = model.inner_states()
         self.applied = 0.0
         self.time = 0.0
@@ -173,7 +173,7 @@ def simulate(
     start = simulator.states.copy()
     states, friction, applied = simulator.follow(intervals(effort, hold), sample_time, n_substeps, load, temperature)
     states = np.vstack([start, states])
-    q, v = model.mechanics.encoder
+    q, v = model.plant.encoder
     return Motion(
         position=states[:, q].copy(),
         velocity=states[:, v].copy(),

@@ -114,8 +114,7 @@ def runs_of(record: Record) -> list[Run]:
 
 def innovations(model: Model, run: Run, index: float) -> Array:
     """Measured minus predicted position at each sample but the first ones [x]."""
-    mechanics = model.mechanics
-    state = np.ascontiguousarray(mechanics.start(np.array(model.plant_values), *run.start), dtype=np.float64)
+    state = np.ascontiguousarray(model.plant.start(np.array(model.plant_values), *run.start), dtype=np.float64)
     loops = model.loops
     found = np.empty(run.effort.shape[0])
     alpha, beta = _gains(index)

@@ -1,6 +1,7 @@
 """Rigid axis: one body, one contact.
 
-Equation: m dv/dt = u - F(q, v, t) - F_contact, stepped by :mod:`fric_nodes.contact`.
+Equation: m dv/dt = u - F(q, v, t) - F_contact, stepped by :mod:`fric_nodes.contact`. With backlash or compliance among the
+terms the axis becomes two bodies, see :mod:`fric_nodes.plants.rigid_driven`.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from ..effect import Context
 from ..kernel import kernel
 from ..parameter import Parameter
 from ..plant import Plant
+from .rigid_driven import DRIVEN
 
 __all__ = ["PLANT"]
 
@@ -47,4 +49,5 @@ PLANT = Plant(
     states=("position", "velocity"),
     functions=(own, *CONTACT_FUNCTIONS, step, drive),
     inertia=_inertia,
+    driven=DRIVEN,
 )
