@@ -28,6 +28,7 @@ def force(c: Context, force: float, coefficient: float) -> float:
 EFFECT = Effect(
     id="asymmetry",
     place=Place.SLIP_LEVEL,
+    order=20,
     title="direction-dependent friction",
     equation="F = D_C + D_v |v|, on top of F_C sgn(v) + F_v v",
     source="de Marchi 1998, asymmetric kinetic and viscous friction",

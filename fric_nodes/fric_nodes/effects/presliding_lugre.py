@@ -8,6 +8,9 @@ without its v_S; the viscous term sigma_2 v is the effect ``viscous``).
 The step is exact for constant velocity: with r = sigma_0 |v| h / g and z_s = g sgn(v) / sigma_0,
 z(h) = z_s + (z(0) - z_s) exp(-r), and its mean over the step is z_s + (z(0) - z_s) (1 - exp(-r)) / r. It therefore neither
 loses stability at high speed, where the bristles are stiff, nor drifts from its bound |z| <= g / sigma_0.
+
+With sigma_0 z^2/2 held by the bristles, what is dissipated is a quadratic form in v and z, which is never negative where
+sigma_1 < 4 g/|v|. Beyond that, at high speed, damped bristles can push the body on for a moment after g has fallen.
 """
 
 from __future__ import annotations

@@ -1,0 +1,58 @@
+"""The age of a contact: how long its asperities have been touching on average.
+
+Equation: d theta/dt = 1 - |v| theta / D_0. At rest theta grows as the clock; sliding by the creep length D_0 renews the
+contacts, so that at constant velocity theta settles at D_0/|v|. A friction that depends on theta alone therefore obeys
+F_static(t = D_0/v) = F_dynamic(v), as Rabinowicz and Baumberger found in experiments.
+Source: Al-Bender, Lampaert, Swevers 2004, section "The lift-up effect" and Appendix I (the relation, and the creep length
+D_0); the differential equation is the ageing law of rate-and-state friction (Dieterich 1979; Rice and Ruina 1983), which
+has that relation as its steady state.
+
+Over a step at constant velocity the equation is linear: with r = |v| h / D_0, theta(h) = theta(0) exp(-r) + h (1 -
+exp(-r)) / r.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .effect import Context
+from .first_order import mean_decay
+from .kernel import kernel
+from .parameter import Parameter
+
+__all__ = ["CREEP_LENGTH", "LOOKS_LIKE", "REGIME", "age", "grow_older", "renewal_rate"]
+
+CREEP_LENGTH = Parameter("length", "D_0", "x", "creep length: sliding by it renews the contacts", positive=True)
+"""The parameter that every law of the contact's age shares."""
+
+REGIME = "the first moment of motion after a rest: the longer the rest, the higher the peak; and low speed"
+
+LOOKS_LIKE = {
+    "stribeck": "repeat reversals with rests of graded length: only with dwell time does break-away depend on the rest",
+    "frictional_lag": "repeat break-away after rests of graded length: with a lag it stops rising after a few time constants",
+    "temperature": "alternate short and long rests in random order: a temperature changes slowly and not with the last rest",
+}
+
+
+@kernel
+def age(c: Context, i: int, length: float) -> float:
+    """The age of the contact [s] at the instant of ``c``, the middle of a step; ``c.memory[i]`` is the age at its start."""
+    half = 0.5 * c.step
+    r = abs(c.velocity) * half / length
+    return float(c.memory[i] * math.exp(-r) + half * mean_decay(r))
+
+
+@kernel
+def grow_older(c: Context, i: int, length: float) -> None:
+    """Lead the age of the contact over the step of ``c``."""
+    r = abs(c.velocity) * c.step / length
+    c.memory[i] = c.memory[i] * math.exp(-r) + c.step * mean_decay(r)
+
+
+def renewal_rate(mass: float, surplus: float, length: float) -> float:
+    """How fast a body speeds up while break-away takes the surplus from it over the creep length, over 4 [1/s].
+
+    From m d^2x/dt^2 = surplus x / length. As with the Stribeck effect, the fall is passed in a moment and its error doesn't
+    add up.
+    """
+    return 0.25 * math.sqrt(max(surplus, 0.0) / (length * mass))
