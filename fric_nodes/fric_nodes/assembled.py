@@ -30,7 +30,6 @@ __all__ = [
     "remember",
     "slip",
     "step",
-    "uncommand",
     "unpacked",
 ]
 
@@ -96,11 +95,6 @@ def slip(z: Any, z_next: Any, v: float, h: float, level: float, constants: Any, 
 
 def command(u: float, h: float, memory: Any, p: Any) -> float:
     """Mean force [F] of the actuator over a step of ``h`` [s] when it is told to give ``u``."""
-    raise AssertionError("a stand-in, see the module")
-
-
-def uncommand(f: float, p: Any) -> float:
-    """Command [F] that makes the memoryless part of the command path give the force ``f``."""
     raise AssertionError("a stand-in, see the module")
 
 

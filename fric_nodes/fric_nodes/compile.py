@@ -58,11 +58,13 @@ class Loops:
         simulate: motion from force.
         predict: force from motion.
         observe: one-step prediction along measured positions.
+        respond: the command path alone.
     """
 
     simulate: Callable[..., None]
     predict: Callable[..., None]
     observe: Callable[..., None]
+    respond: Callable[..., None]
 
 
 def loops_for(plant: Plant, effects: Sequence[Effect]) -> Loops:
@@ -99,6 +101,8 @@ def _counter(plant: Plant, effects: tuple[Effect, ...]) -> Callable[[Array], int
 def _with_work_space(loop: Callable[..., None], n_states: int, n_constants: Callable[[Array], int]) -> Callable[..., None]:
     """``loop`` with its work space, the last arguments, made anew for each call, so that threads don't meet."""
     parameters = list(inspect.signature(getattr(loop, "py_func", loop)).parameters)
+    if "z" not in parameters:
+        return loop
     z = parameters.index("z")
 
     def call(*arguments: Any) -> None:
@@ -118,7 +122,6 @@ class _Assembly:
         self.remember: list[str] = []
         self.slip = "    return 0.0"
         self.command: list[str] = []
-        self.uncommand: list[str] = []
         self.play: list[str] = []
         self.prepare: list[str] = []
         self._at = at
@@ -146,8 +149,6 @@ class _Assembly:
             self.force.append(f"    total += {call('force', 'c', *kept)}")
         if effect.command is not None:
             self.command.append(f"    u = {call('command', 'u', 'h', 'memory', str(self._memory))}")
-        if effect.uncommand is not None:
-            self.uncommand.insert(0, f"    f = {call('uncommand', 'f')}")
         if effect.play is not None:
             self.play.append(f"    total += {call('play')}")
         constants = self._prepare(call) if effect.prepare is not None else ()
@@ -203,9 +204,6 @@ def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
         "@kernel\ndef command(u, h, memory, p):",
         *parts.command,
         "    return u",
-        "@kernel\ndef uncommand(f, p):",
-        *parts.uncommand,
-        "    return f",
         "@kernel\ndef prepare(p, constants):",
         *(parts.prepare or ["    pass"]),
         *(inspect.getsource(_plain(function)) for function in plant.functions),

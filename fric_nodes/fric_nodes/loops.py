@@ -23,13 +23,12 @@ from .assembled import (
     remember,
     slip,
     step,
-    uncommand,
     unpacked,
 )
 from .effect import Context
 from .kernel import kernel
 
-__all__ = ["LOOPS", "advance", "observe", "predict", "simulate"]
+__all__ = ["LOOPS", "advance", "observe", "predict", "respond", "simulate"]
 
 
 @kernel
@@ -88,7 +87,7 @@ def predict(
     p: Any, t: Any, q: Any, v: Any, a: Any, h: float, load: Any, temperature: Any, z: Any, memory: Any, u_out: Any,
     friction_out: Any, x_next: Any, z_next: Any, constants: Any,
 ) -> None:  # fmt: skip
-    """Force that the model needs for the motion ``q``, ``v``, ``a`` at each sample, all of shape ``(n_samples,)``.
+    """Force that has to come out of the command path for the motion ``q``, ``v``, ``a``, all of shape ``(n_samples,)``.
 
     Slip dynamics are led from half a step before each sample to half a step after it at the sample's velocity, so that the mean
     force over the step belongs to the sample itself and no half step of delay creeps in. ``z`` and ``memory`` are led on in
@@ -108,7 +107,7 @@ def predict(
             for j in range(z.shape[0]):
                 z[j] = z_next[j]
         friction_out[k] = friction
-        u_out[k] = uncommand(drive(p, q[k], v[k], a[k]) + force(c, p) + friction, p)
+        u_out[k] = drive(p, q[k], v[k], a[k]) + force(c, p) + friction
         if MEMORY:
             remember(c, p)
 
@@ -143,5 +142,15 @@ def observe(
         t += h[k]
 
 
-LOOPS = (simulate, predict, observe)
+def respond(p: Any, u: Any, h: float, n_sub: int, memory: Any, applied_out: Any) -> None:
+    """What comes out of the command path, its mean over each interval, ``(len(u),)``, when ``u[k]`` is commanded over it."""
+    p = unpacked(p)
+    for k in range(u.shape[0]):
+        applied = 0.0
+        for _ in range(n_sub):
+            applied += command(u[k], h / n_sub, memory, p)
+        applied_out[k] = applied / n_sub
+
+
+LOOPS = (simulate, predict, observe, respond)
 """The loops, in the order of :class:`fric_nodes.compile.Loops`."""

@@ -156,6 +156,18 @@ class Model:
         return slip[0] if slip else np.zeros(0), np.zeros(sum(held.effect.n_memory for held in self.terms))
 
     @property
+    def has_command_path(self) -> bool:
+        """True when the force that acts isn't the one that is commanded."""
+        return any(held.effect.command is not None for held in self.terms)
+
+    def uncommand(self, force: float) -> float:
+        """The command that makes the command path give ``force`` [F], as far as its terms have no memory."""
+        for held in reversed(self.terms):
+            if held.effect.uncommand is not None:
+                force = held.effect.uncommand(force, *held.values)
+        return force
+
+    @property
     def has_slip_dynamics(self) -> bool:
         """True when a pre-sliding law replaces exact sticking."""
         return any(held.effect.slip is not None for held in self.terms)

@@ -35,7 +35,7 @@ class Parameter:
     Attributes:
         name: key in the model file, lower case.
         symbol: as in the equation.
-        dimension: ``F`` (force), ``x`` (position), ``s`` and ``1``, combined with ``/``, blanks and ``^``.
+        dimension: ``F`` (force), ``x`` (position), ``s``, ``K`` and ``1``, combined with ``/``, blanks and ``^``.
         doc: what it is, one sentence.
         lower: smallest value allowed, in SI.
         upper: largest value allowed, in SI.

@@ -14,7 +14,7 @@ import numpy as np
 from .model import Model
 from .record import Array
 
-__all__ = ["Motion", "Predictor", "Simulator", "intervals", "predict_force", "simulate"]
+__all__ = ["Motion", "Predictor", "Simulator", "intervals", "predict_force", "respond", "simulate"]
 
 _STEP_OF_RATE = 0.04  # largest product of step and fastest rate; keeps forces to 1e-4 of their range
 _MAX_SUBSTEPS = 2000
@@ -183,8 +183,27 @@ def simulate(
     )
 
 
+def respond(model: Model, effort: Array, sample_time: float) -> Array:
+    """The force that the command path of ``model`` gives over each interval of ``sample_time`` [s], shape ``(n_intervals,)``.
+
+    Args:
+        model: its command path is what counts.
+        effort: command over each interval [F], shape ``(n_intervals,)``.
+        sample_time: [s].
+    """
+    if not model.has_command_path:
+        return effort
+    applied = np.empty(effort.shape[0])
+    _, memory = model.inner_states()
+    n_substeps = substeps(model, sample_time)
+    model.loops.respond(model.values, np.ascontiguousarray(effort), sample_time, n_substeps, memory, applied)
+    return applied
+
+
 class Predictor:
     """The force that a model needs along a motion; ``friction_state`` and ``memory`` are kept from call to call.
+
+    It is the force that has to come out of the command path; :meth:`fric_nodes.model.Model.uncommand` gives the command for it.
 
     Args:
         model: what is to be moved.

@@ -228,3 +228,47 @@ def test_what_a_load_is_relative_to_is_the_model_s_and_not_each_recording_s() ->
     assert temperature[0] == 5.0
     with pytest.raises(RecordError, match="mean of 'normal_load' is 0"):
         nominal_conditions([replace(records[0], extra={"normal_load": 0.0 * time})])
+
+
+@pytest.mark.parametrize(
+    "path",
+    [term("input_deadzone", width=3.0), term("delay", time=0.02), term("actuator_lag", time=0.03)],
+    ids=["dead zone", "delay", "lag"],
+)
+def test_a_command_path_stands_between_the_recorded_effort_and_the_force(path: Term) -> None:
+    # A motion in closed form: the force that it needs is worked out here, and so is the command that gives this force.
+    # A lag can't follow the jump of Coulomb friction; there is none behind it.
+    step, mass, viscous = 1e-3, 2.0, 15.0
+    coulomb = 0.0 if path.effect.id == "actuator_lag" else 8.0
+    time = np.arange(30_000) * step
+    lines = [(0.31, 0.05, 0.0), (0.83, 0.02, 1.0), (1.7, 0.006, 2.0)]
+
+    def motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        w = [2.0 * np.pi * f for f, _, _ in lines]
+        position = sum(a * np.sin(k * t + p) for k, (_, a, p) in zip(w, lines, strict=True))
+        velocity = sum(a * k * np.cos(k * t + p) for k, (_, a, p) in zip(w, lines, strict=True))
+        acceleration = sum(-a * k * k * np.sin(k * t + p) for k, (_, a, p) in zip(w, lines, strict=True))
+        return np.asarray(position), np.asarray(velocity), np.asarray(acceleration)
+
+    def force(t: np.ndarray) -> np.ndarray:
+        _, v, a = motion(t)
+        return np.asarray(mass * a + viscous * v + coulomb * np.sign(v))
+
+    if path.effect.id == "input_deadzone":
+        effort = force(time) + 3.0 * np.sign(force(time))
+    elif path.effect.id == "delay":
+        effort = force(time + 0.02)
+    else:
+        effort = force(time) + 0.03 * np.gradient(force(time), step)
+    record = Record(time, motion(time)[0], effort, effort_hold="linear")
+    held = tuple(f"{path.effect.id}.{p.name}" for p in path.effect.parameters)
+    found = FIT(structure(path, asymmetry=False), [record], Options(held=(*held, "bias.force")))
+    assert found.model.value("mass") == pytest.approx(mass, rel=0.01)
+    assert found.model.value("coulomb.force") == pytest.approx(coulomb, abs=0.1)
+    assert found.model.value("viscous.coefficient") == pytest.approx(viscous, rel=0.02)
+    without = FIT(structure(asymmetry=False), [record], Options(held=("bias.force",)))
+    if path.effect.id == "input_deadzone":
+        # What a dead zone takes looks like Coulomb friction for as long as the joint moves.
+        assert without.model.value("coulomb.force") == pytest.approx(coulomb + 3.0, abs=0.3)
+    else:
+        assert without.train.noe > 2.0 * found.train.noe

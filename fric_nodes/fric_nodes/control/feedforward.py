@@ -42,6 +42,7 @@ class _Voice:
 
     def __init__(self, model: Model | None, weight: float, rest_fade_time: float) -> None:
         self.weight = weight
+        self._model = model
         self._predictor = Predictor(model) if model is not None else None
         self._keeps_state = model is not None and any(held.effect.slip is not None for held in model.terms)
         self._fade_time = rest_fade_time
@@ -49,12 +50,18 @@ class _Voice:
         self._friction = 0.0
         self._inputs = np.zeros((4, 1))
 
-    def force(self, time: float, position: float, velocity: float, acceleration: float, duration: float) -> float:
-        if self._predictor is None:
+    def command(self, time: float, position: float, velocity: float, acceleration: float, duration: float) -> float:
+        """What to command for the motion [F]."""
+        if self._predictor is None or self._model is None:
             return 0.0
+        return self._model.uncommand(self._force(self._predictor, time, position, velocity, acceleration, duration))
+
+    def _force(
+        self, predictor: Predictor, time: float, position: float, velocity: float, acceleration: float, duration: float
+    ) -> float:
         inputs = self._inputs
         inputs[0, 0], inputs[1, 0], inputs[2, 0], inputs[3, 0] = time, position, velocity, acceleration
-        effort, friction = self._predictor.run(inputs[0], inputs[1], inputs[2], inputs[3], duration)
+        effort, friction = predictor.run(inputs[0], inputs[1], inputs[2], inputs[3], duration)
         if self._keeps_state:
             return float(effort[0])
         if velocity != 0.0:
@@ -192,5 +199,5 @@ class Feedforward:
         self._mix(duration)
         total = 0.0
         for voice in self._voices:
-            total += voice.weight * voice.force(time + ahead, position, velocity, acceleration, duration)
+            total += voice.weight * voice.command(time + ahead, position, velocity, acceleration, duration)
         return self._gain * total

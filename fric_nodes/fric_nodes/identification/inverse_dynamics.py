@@ -24,7 +24,7 @@ from .conclusion import Fitted, concluded
 from .equations import Equations, equations
 from .free_parameters import FreeParameters, candidates
 from .result import Identification, IdentificationError, Method, Options
-from .scoring import force_along
+from .scoring import driving_force, force_along
 from .statistics import sandwich_covariance
 from .verdict import collinear
 
@@ -74,7 +74,7 @@ def _fit_linear(model: Model, found: Equations, free: FreeParameters, use: Mask,
     linear = np.array([parameter.declaration.linear for parameter in model.parameters()])
     values_of_held = np.where(linear, values, 0.0)
     values_of_held[free.index] = 0.0
-    target = found.force - columns @ values_of_held
+    target = driving_force(model, found) - columns @ values_of_held
     part = columns[:, free.index]
     scale = np.linalg.norm(part[use], axis=0)
     scale[scale == 0.0] = 1.0
@@ -128,7 +128,7 @@ def _search_dynamic(model: Model, found: Equations, free: FreeParameters, robust
             values = best.values
             values[number] = value
             trial = model.with_values(values)
-            cost = _cost(found.force - predicted(trial, found), use, robust)
+            cost = _cost(driving_force(trial, found) - predicted(trial, found), use, robust)
             if cost < best_cost:
                 best, best_cost = trial, cost
     return best
@@ -142,7 +142,8 @@ def _refine(model: Model, found: Equations, free: FreeParameters, use: Mask, rob
     def residual(scaled: Array) -> Array:
         values = start.copy()
         values[free.index] = scaled * scale
-        return found.force - predicted(model.with_values(values), found)
+        trial = model.with_values(values)
+        return driving_force(trial, found) - predicted(trial, found)
 
     weight = weights(residual(start[free.index] / scale), use, robust)
     free = free.within_reach(model, found)

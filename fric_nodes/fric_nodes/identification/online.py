@@ -32,6 +32,7 @@ from .equations import Equations, at_rest, equations
 from .free_parameters import FreeParameters
 from .inverse_dynamics import regressors
 from .result import IdentificationError, Options
+from .scoring import driving_force
 
 __all__ = ["Estimate", "OnlineIdentifier", "State"]
 
@@ -210,8 +211,9 @@ class OnlineIdentifier:
         held = np.where([p.declaration.linear for p in self.structure.parameters()], self.structure.values, 0.0)
         held[self._free.index] = 0.0
         row_time = float(found.time[1] - found.time[0])
+        force = driving_force(self.structure, found)
         block = _Block(
-            columns[:, self._free.index], found.force - columns @ held, found.velocity, found.sliding, row_time, sample_time
+            columns[:, self._free.index], force - columns @ held, found.velocity, found.sliding, row_time, sample_time
         )
         self._blocks.append(block)
         rest = self._rest_limit()

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array, Record
-from ..simulate import Predictor, simulate
+from ..simulate import Predictor, intervals, respond, simulate
 from .equations import Equations, Stretch, equations
 from .result import Options, Score
 
-__all__ = ["force_along", "free_run", "score"]
+__all__ = ["driving_force", "force_along", "free_run", "score"]
 
 
 def score(model: Model, records: Sequence[Record], options: Options, found: Equations | None = None) -> Score:
@@ -30,7 +30,7 @@ def score(model: Model, records: Sequence[Record], options: Options, found: Equa
     found = equations(list(records), options) if found is None else found
 
     use = found.sliding
-    force = found.force[use]
+    force = driving_force(model, found)[use]
     error = force - found.rows(lambda stretch: force_along(model, stretch))[use]
     spread = force - float(np.mean(force))
     off = np.concatenate([free_run(model, stretch) - stretch.raw_position for stretch in found.stretches])
@@ -41,6 +41,20 @@ def score(model: Model, records: Sequence[Record], options: Options, found: Equa
         position_rmse=float(np.sqrt(np.mean(off**2))),
         n_samples=int(error.shape[0]),
     )
+
+
+def driving_force(model: Model, found: Equations) -> Array:
+    """The force of every row that acts when the recorded effort goes through the model's command path, shape ``(n_rows,)``."""
+    if not model.has_command_path:
+        return found.force
+
+    def acting(stretch: Stretch) -> Array:
+        given = respond(model, intervals(stretch.effort, stretch.hold), stretch.sample_time)
+        around = np.concatenate([given[:1], given, given[-1:]])
+        result: Array = 0.5 * (around[:-1] + around[1:])
+        return result
+
+    return found.rows(acting)
 
 
 def force_along(model: Model, stretch: Stretch) -> Array:

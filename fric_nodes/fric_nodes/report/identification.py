@@ -8,7 +8,7 @@ import numpy as np
 
 from ..identification.equations import Equations, equations
 from ..identification.result import Identification, Options, Score
-from ..identification.scoring import force_along, free_run
+from ..identification.scoring import driving_force, force_along, free_run
 from ..model import Model
 from ..model_file import model_to_text
 from ..record import Array, Record
@@ -77,6 +77,7 @@ def _score_rows(result: Identification) -> list[tuple[str, ...]]:
 
 
 def _force_section(name: str, model: Model, found: Equations) -> Section:
+    measured = driving_force(model, found)
     predicted = found.rows(lambda stretch: force_along(model, stretch))
     off = [free_run(model, stretch) - stretch.raw_position for stretch in found.stretches]
     units = model.units
@@ -86,11 +87,11 @@ def _force_section(name: str, model: Model, found: Equations) -> Section:
             (
                 f"force [{units.force}]",
                 [
-                    Curve("measured", found.time, found.force, "measured", width=2.2),
+                    Curve("measured", found.time, measured, "measured", width=2.2),
                     Curve("predicted from the motion", found.time, predicted, "after"),
                 ],
             ),
-            (f"difference [{units.force}]", [Curve("measured minus predicted", found.time, found.force - predicted, "before")]),
+            (f"difference [{units.force}]", [Curve("measured minus predicted", found.time, measured - predicted, "before")]),
             (
                 f"free run, position error [{units.position}]",
                 [Curve("simulated minus measured position", time, np.concatenate(off), "second")],
@@ -105,7 +106,7 @@ def _force_section(name: str, model: Model, found: Equations) -> Section:
 def _curve_section(model: Model, found: Equations) -> Section:
     static = [held for held in model.terms if held.effect.slip is None]
     inertial = model.with_terms(())
-    friction = found.force - found.rows(lambda stretch: force_along(inertial, stretch))
+    friction = driving_force(model, found) - found.rows(lambda stretch: force_along(inertial, stretch))
     top = float(np.max(np.abs(found.velocity)))
     side = np.geomspace(1e-4 * top, top, 200)
     grid = np.concatenate([-side[::-1], side])
