@@ -1,0 +1,117 @@
+"""Return-point memory: after an inner loop closes, friction is back on the outer curve as if the loop had never been.
+
+A displacement is led over an outer loop, on whose rising branch it turns back twice. Once an inner loop has closed, laws with a
+memory of their reversal points (GMS, Maxwell slip) go on along the outer curve; laws with a single state (LuGre, Dahl,
+elasto-plastic) have forgotten where they turned and go on beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from ..bench.benchmark import Figure
+from ..model import Term, build_model, term
+from ..record import Array
+from ..report.figures import Curve, scatter_and_curves
+from ..simulate import Predictor
+from .verification import Evidence, Verification
+
+__all__ = ["VERIFICATION"]
+
+_LEVEL = 5.0  # [N]
+_STIFFNESS = 1e5  # [N/m]
+_TIP = 800  # amplitude of the outer loop, in steps
+_STEP = 1e-7  # [m]
+_TIME = 1e-3  # [s] for each step
+_LOOPS = ((-150, -500), (350, 0))  # where each inner loop begins on the rising branch, and how far back it goes
+
+
+def _laws() -> dict[str, Term]:
+    # Ten springs, the stiffer the sooner they slide; their limits are proportions, see the law.
+    springs = {f"stiffness_{i}": _STIFFNESS / 55 * (11 - i) for i in range(1, 11)}
+    limits = {f"limit_{i}": 8e-6 * i for i in range(1, 11)}
+    return {
+        "GMS": term("presliding", "gms", stiffness=_STIFFNESS, attraction=1e3),
+        "Maxwell slip": term("presliding", "maxwell_slip", **springs, **limits),
+        "LuGre": term("presliding", "lugre", stiffness=_STIFFNESS),
+        "Dahl": term("presliding", "dahl", stiffness=_STIFFNESS),
+        "elasto-plastic": term("presliding", "elasto_plastic", stiffness=_STIFFNESS, breakaway=0.5),
+    }
+
+
+def _path(loops: Sequence[tuple[int, int]]) -> Array:
+    """Positions in whole steps: up, down, up, down to the lower tip, then up again with the inner ``loops`` on the way."""
+    corners = [0, _TIP, -_TIP, _TIP, -_TIP]
+    for begin, back in loops:
+        corners += [begin, back, begin]
+    corners.append(_TIP)
+    parts = [np.arange(a, b, 1 if b > a else -1) for a, b in pairwise(corners)]
+    return np.concatenate([*parts, [_TIP]]).astype(np.float64)
+
+
+def _force(law: Term, path: Array) -> tuple[Array, Array]:
+    """Middle of each step along ``path`` [steps] and mean friction over it [N]."""
+    model = build_model("rigid", {"mass": 1.0}, [term("coulomb", force=_LEVEL), law])
+    middle = 0.5 * (path[1:] + path[:-1])
+    n = middle.shape[0]
+    velocity = np.diff(path) * _STEP / _TIME
+    _, friction = Predictor(model).run(_TIME * np.arange(n, dtype=np.float64), _STEP * middle, velocity, np.zeros(n), _TIME)
+    return middle, friction
+
+
+def _deviations(law: Term) -> tuple[list[float], float, tuple[Array, Array], tuple[Array, Array]]:
+    """Largest deviation after each inner loop, as a share of the force's range, that range, and both curves."""
+    plain = _force(law, _path(()))
+    looped = _force(law, _path(_LOOPS))
+    span = float(np.ptp(plain[1]))
+    rising = plain[1][-2 * _TIP :]  # the last branch, one step after the other from the lower tip
+    found = []
+    n = looped[0].shape[0]
+    for number, (begin, _) in enumerate(_LOOPS):
+        end = _LOOPS[number + 1][0] if number + 1 < len(_LOOPS) else _TIP
+        # From behind, the way from where the loop closes to where the next one begins.
+        later = sum(2 * (first - back) for first, back in _LOOPS[number + 1 :])
+        first = n - (_TIP - begin) - later
+        part = looped[1][first : first + end - begin]
+        found.append(float(np.max(np.abs(part - rising[begin + _TIP : end + _TIP]))) / span)
+    return found, span, plain, looped
+
+
+def _run() -> Evidence:
+    figures = []
+    plots = []
+    for name, law in _laws().items():
+        found, span, plain, looped = _deviations(law)
+        remembers = name in ("GMS", "Maxwell slip")
+        for number, share in enumerate(found, start=1):
+            goal = "<= 0.01" if remembers else ""
+            if name == "LuGre":
+                goal = ">= 0.01"
+            figures.append(Figure(f"{name}: off the outer curve after inner loop {number}, of the range", share, "1", goal))
+        if name in ("GMS", "Maxwell slip", "LuGre"):
+            to_um = 1e6 * _STEP
+            curves = [
+                Curve("with two inner loops", looped[0] * to_um, looped[1], "before" if name == "LuGre" else "after"),
+                Curve("outer loop alone", plain[0] * to_um, plain[1], "true", "dot"),
+            ]
+            caption = (
+                f"{name}: largest deviation from the outer curve after the inner loops {100 * max(found):.2g} % of the range"
+                f" of {span:.3g} N."
+            )
+            plots.append((scatter_and_curves(None, curves, "displacement [µm]", "friction [N]"), caption))
+    notes = [
+        "Displacement-driven, level 5 N, stiffness 1e5 N/m, steps of 0.1 µm. GMS and Maxwell slip have ten elements.",
+        "LuGre's goal is the other way round: its deviation must be visible, since it has no memory of reversal points.",
+    ]
+    return Evidence(figures, plots, notes)
+
+
+VERIFICATION = Verification(
+    id="presliding-memory",
+    title="Return-point memory of the pre-sliding laws",
+    source="Lampaert et al. 2005; Amthor et al. 2008, Sec. 2 (hysteresis with non-local memory); Al-Bender et al. 2004",
+    run=_run,
+)
