@@ -26,7 +26,7 @@ def verify(
 ) -> None:
     """Verify the physics; exit status 1 when a goal is missed."""
     from ..files import write_text
-    from ..report.verification import number, verification_page
+    from ..report.verification import goal, quantity, verification_page
     from ..verification import VERIFICATIONS
 
     chosen = names or list(VERIFICATIONS)
@@ -54,8 +54,8 @@ def verify(
             typer.echo(f"{check.id}: {sum(f.reached is True for f in with_goal)} of {len(with_goal)} goals reached")
             for f in evidence.figures:
                 if names or f.reached is False:
-                    mark = "" if f.reached is None else f"  ({f.goal}: {'reached' if f.reached else 'MISSED'})"
-                    typer.echo(f"  {f.name}: {number(f.value)} {f.unit}{mark}")
+                    mark = "" if f.reached is None else f"  ({goal(f)}: {'reached' if f.reached else 'MISSED'})"
+                    typer.echo(f"  {f.name}: {quantity(f.value, f.unit)}{mark}")
         typer.echo(f"written: {out}")
     if any(f.reached is False for _, f in figures):
         raise typer.Exit(1)

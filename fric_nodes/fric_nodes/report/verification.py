@@ -8,7 +8,7 @@ from ..bench.benchmark import Figure
 from ..verification.verification import Evidence, Verification
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 
-__all__ = ["verification_page"]
+__all__ = ["goal", "quantity", "verification_page"]
 
 _MARKS = {True: "reached", False: "MISSED", None: ""}
 
@@ -18,9 +18,18 @@ def number(value: float) -> str:
     return f"{value:.0f}" if value == round(value) and abs(value) < 1e6 else f"{value:.4g}"
 
 
+def quantity(value: float, unit: str) -> str:
+    """``value`` with its unit, which a pure number has none of."""
+    return f"{number(value)} {unit}".strip() if unit != "1" else number(value)
+
+
+def goal(found: Figure) -> str:
+    """The goal of ``found`` with its unit, or nothing."""
+    return f"{found.goal} {found.unit}".strip() if found.goal and found.unit != "1" else found.goal
+
+
 def _row(found: Figure) -> list[str]:
-    goal = f"{found.goal} {found.unit}".strip() if found.goal else ""
-    return [found.name, f"{number(found.value)} {found.unit}".strip(), goal, _MARKS[found.reached]]
+    return [found.name, quantity(found.value, found.unit), goal(found), _MARKS[found.reached]]
 
 
 def _section(check: Verification, evidence: Evidence) -> Section:
@@ -39,7 +48,7 @@ def verification_page(found: Sequence[tuple[Verification, Evidence]]) -> str:
     """The page as text."""
     figures = [each for _, evidence in found for each in evidence.figures]
     with_goal = [each for each in figures if each.reached is not None]
-    missed = [f"{each.name}: {number(each.value)} {each.unit}, goal {each.goal}" for each in with_goal if not each.reached]
+    missed = [f"{each.name}: {quantity(each.value, each.unit)}, goal {each.goal}" for each in with_goal if not each.reached]
     counts = tiles(
         (
             (f"{len(with_goal) - len(missed)} of {len(with_goal)}", "goals reached"),
