@@ -154,11 +154,15 @@ def slide(p: Any, m: float, x: Any, x_next: Any, s: Inner, u: float, h: float, a
             impulse += push * left
             break
         w = 0.5 * v
-        c = Context(q, w, side, around.time, around.load, around.temperature, -side, left, s.memory)
-        friction = side * level(c, p)
-        braking = side * (own(c, p) + force(c, p) + friction - u)
-        # Not longer than what is left: so it would be only where the step is too long for the law.
-        stop = m * abs(v) / braking if braking * left > m * abs(v) else left
+        stop = left
+        friction = 0.0
+        # The middle of the stop depends on how long it takes, which the trial before tells well enough.
+        for _ in range(3):
+            c = Context(q + 0.5 * w * stop, w, side, around.time, around.load, around.temperature, -side, stop, s.memory)
+            friction = side * level(c, p)
+            braking = side * (own(c, p) + force(c, p) + friction - u)
+            # Not longer than what is left: so it would be only where the step is too long for the law.
+            stop = m * abs(v) / braking if braking * left > m * abs(v) else left
         q += w * stop
         impulse += friction * stop
         v = 0.0

@@ -11,15 +11,16 @@ the mean force that the link gives for the deflections e_0 and e_1 that it leads
 
     L = link(e_0, e_1(L), h).
 
-The more it pulls, the less the motor gets ahead, so e_1 falls with L, and L - link(...) rises with a slope of 1 at least: there is
-one root, and it lies between any trial and that trial less its excess. Regula falsi finds it in two more trials where
+The more it pulls, the less the motor gets ahead, so e_1 falls with L, and L - link(...) rises with a slope of 1 at least: there
+is one root, and it lies between any trial and that trial less its excess. Regula falsi finds it in two more trials where
 everything is linear. As one force leads both bodies, no momentum is lost but to rounding, and as its work on both is
-L (e_1 - e_0), the energy of an undamped link is kept as well as the root is found, whatever the step and whatever sticks or stops.
+L (e_1 - e_0), the energy of an undamped link is kept as well as the root is found, whatever the step and whatever sticks or
+stops.
 
 Rigid transmission: no term of the model gives a force. Within the play both bodies move for themselves. Where they meet they
-go on with their common velocity (m_m dy/dt + m_l dq/dt)/(m_m + m_l), a fully plastic impact at the time within the step at which
-they meet; from there on they are one body as long as they would get into each other otherwise. Without play they are one
-body always.
+go on with their common velocity (m_m dy/dt + m_l dq/dt)/(m_m + m_l), a fully plastic impact at the time within the step at
+which they meet; from there on they are one body as long as they would get into each other otherwise. Without play they are
+one body always.
 
 With slip dynamics a step in which the load's velocity changes its sign is not split there, as it is for a body alone.
 Source: Tao and Kokotovic 1994 as read by de Marchi 1998 (plastic impact, conserved momentum) for the rigid one; the
@@ -106,39 +107,40 @@ def elastic_step(
 ) -> float:
     """The step with an elastic transmission; mean friction force of the contact [F]."""
     e = x[2] - x[0]
-    a = link(e, e + h * (x[3] - x[1]), h, p)
-    excess_a, friction = elastic_trial(p, motor, m_l, x, x_next, s, u, a, h, around)
-    if excess_a == 0.0:
-        return friction
-    b = a - excess_a
-    excess_b, friction = elastic_trial(p, motor, m_l, x, x_next, s, u, b, h, around)
-    enough = 1e-9 * abs(excess_a)
-    for _ in range(60):
-        if abs(excess_b) <= enough or abs(b - a) <= 4e-16 * abs(b):
-            break
-        f = b - excess_b * (b - a) / (excess_b - excess_a) if excess_b != excess_a else 0.5 * (a + b)
+    f = link(e, e + h * (x[3] - x[1]), h, p)
+    a = b = f
+    excess_a = excess_b = enough = friction = 0.0
+    for trial in range(60):
         excess, friction = elastic_trial(p, motor, m_l, x, x_next, s, u, f, h, around)
-        if excess * excess_b < 0.0:
+        if trial == 0:
+            enough = 1e-9 * abs(excess)
+        if abs(excess) <= enough or (trial > 0 and abs(f - b) <= 4e-16 * abs(f)):
+            break
+        if trial == 1 or excess * excess_b < 0.0:
             a, excess_a = b, excess_b
         elif abs(excess) > 0.5 * abs(excess_b):
             excess_a *= 0.5  # Illinois: the end that stays is made to move
         b, excess_b = f, excess
+        if trial == 0:
+            f -= excess
+        elif excess != excess_a:
+            f -= excess * (f - a) / (excess - excess_a)
+        else:
+            f = 0.5 * (f + a)
     return friction
 
 
 @kernel
-def as_one(
-    p: Any, m: float, dry: float, x: Any, x_next: Any, s: Inner, u: float, h: float, around: Surroundings
-) -> float:
+def as_one(p: Any, m: float, dry: float, x: Any, x_next: Any, s: Inner, u: float, h: float, around: Surroundings) -> float:
     """The step of both as one body of mass ``m`` with the motor's Coulomb friction ``dry`` [F] beside the contact's."""
     if dry == 0.0:
         return contact_step(p, m, x, x_next, s, u, h, around)
     q, v = x[0], x[1]
-    left = h
+    left = span = h
+    stops = False
     impulse = 0.0
-    for _ in range(3):
+    for _ in range(5):
         side = 1.0 if v > 0.0 else -1.0
-        push = 0.0
         if v == 0.0:
             opposed, friction = opposing(p, s, q, 0.0, left, 1.0, 0.0, around)
             push = u - opposed
@@ -153,27 +155,29 @@ def as_one(
             if abs(push) <= held:
                 impulse += left * friction
                 break
-        w, friction = solve(p, m, s, q, v, u - side * dry, left, side, around)
+        w, friction = solve(p, m, s, q, v, u - side * dry, span, side, around)
         v_1 = 2.0 * w - v
-        if v_1 * side >= 0.0:
-            q += left * w
-            v = v_1
-            impulse += left * friction
-            break
-        if v == 0.0:
-            # Pushed off and turned back within the step: friction holds.
-            impulse += left * friction
-            break
-        part = left * v / (v - v_1)
-        w, friction = solve(p, m, s, q, v, u - side * dry, part, side, around)
-        q += part * w
-        v = 0.0
-        impulse += part * friction
-        left -= part
-        for j in range(s.z.shape[0]):
-            s.z[j] = s.z_next[j]
+        if stops:
+            # It has come to rest, and what is left of the step starts from there.
+            v_1 = 0.0
+        elif v_1 * side < 0.0:
+            if v == 0.0:
+                # Pushed off and turned back within the step: friction holds.
+                impulse += left * friction
+                break
+            span = left * v / (v - v_1)
+            stops = True
+            continue
+        q += span * w
+        v = v_1
+        impulse += span * friction
+        left -= span
         if left <= 0.0:
             break
+        span = left
+        stops = False
+        for j in range(s.z.shape[0]):
+            s.z[j] = s.z_next[j]
     x_next[0] = q
     x_next[1] = v
     return impulse / h
@@ -195,45 +199,46 @@ def rigid_step(
 ) -> float:
     """The step with rigid stops ``half`` [x] to either side; mean friction force of the contact [F]."""
     m_m, dry, viscous = motor
-    both = (*p[:-1], viscous)
-    left = h
+    left = span = h
     impulse = 0.0
-    for _ in range(6):
-        e_0 = x[2] - x[0]
-        side = 1.0 if e_0 > 0.0 else -1.0
-        if half > 0.0:
-            friction = load_step(p, m_l, x, x_next, s, 0.0, left, around)
-            w, v = motor_step(m_m, dry, viscous, x[3], u, left)
-            x_next[2] = x[2] + left * w
-            x_next[3] = v
-            e_1 = x_next[2] - x_next[0]
-            if abs(e_1) <= half:
-                return (impulse + left * friction) / h
-            side = 1.0 if e_1 > 0.0 else -1.0
-            way = half - side * e_0
+    meet = 0.0  # the side at which they meet at the end of the span, if they do
+    for _ in range(12 if half > 0.0 else 0):
+        friction = load_step(p, m_l, x, x_next, s, 0.0, span, around)
+        w, v = motor_step(m_m, dry, viscous, x[3], u, span)
+        x_next[2] = x[2] + span * w
+        x_next[3] = v
+        if meet == 0.0:
+            e = x_next[2] - x_next[0]
+            if abs(e) <= half:
+                return (impulse + span * friction) / h
+            meet = 1.0 if e > 0.0 else -1.0
+            way = half - meet * (x[2] - x[0])
             if way > 1e-12 * (half + abs(x[0])):
-                part = until_contact(way, side * (x[3] - x[1]), side * (x_next[3] - x_next[1]), left)
-                friction = load_step(p, m_l, x, x_next, s, 0.0, part, around)
-                w, v = motor_step(m_m, dry, viscous, x[3], u, part)
-                x[0], x[1], x[2], x[3] = x_next[0], x_next[1], x[2] + part * w, v
-                for j in range(s.z.shape[0]):
-                    s.z[j] = s.z_next[j]
-                impulse += part * friction
-                left -= part
-                e_0 = side * half
-        if x[3] != x[1]:
-            v = (m_m * x[3] + m_l * x[1]) / (m_m + m_l)
-            x[1], x[2], x[3] = v, x[0] + (side * half if half > 0.0 else e_0), v
-            if half > 0.0 and left > 0.0:
-                continue  # do they press on, or part at once?
-        break
+                span = until_contact(way, meet * (x[3] - x[1]), meet * (v - x_next[1]), span)
+                continue
+            if x[3] == x[1]:
+                break  # they press on each other
+        else:
+            x[0], x[1], x[3] = x_next[0], x_next[1], v
+            for j in range(s.z.shape[0]):
+                s.z[j] = s.z_next[j]
+            impulse += span * friction
+            left -= span
+        x[1] = x[3] = (m_m * x[3] + m_l * x[1]) / (m_m + m_l)
+        x[2] = x[0] + meet * half
+        if left <= 0.0:
+            break
+        span = left
+        meet = 0.0  # do they press on, or part at once?
     if left > 0.0:
-        e_0 = x[2] - x[0]
-        impulse += left * as_one(both, m_m + m_l, dry, x, x_next, s, u, left, around)
-        x_next[2] = x_next[0] + e_0
+        e = x[2] - x[0]
+        impulse += left * as_one((*p[:-1], viscous), m_m + m_l, dry, x, x_next, s, u, left, around)
+        x_next[2] = x_next[0] + e
         x_next[3] = x_next[1]
     else:
         x_next[0], x_next[1], x_next[2], x_next[3] = x[0], x[1], x[2], x[3]
+        for j in range(s.z.shape[0]):
+            s.z_next[j] = s.z[j]
     return impulse / h
 
 

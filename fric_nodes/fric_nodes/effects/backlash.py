@@ -35,9 +35,9 @@ EFFECT = Effect(
     play=play,
     regime="after every reversal of the force: the motor crosses the gap alone, with nothing but its own inertia to move",
     looks_like={
-        "compliance": "push the resting load gently: through a gap the motor moves without force, against a spring it needs one",
-        "impact_backlash": "look at the motor's velocity when it has crossed the gap: at rigid stops it jumps once, at elastic ones it rings",
-        "input_deadzone": "turn the motor by hand: with a gap it is free while the load rests; a dead zone is in the command only",
+        "compliance": "push the resting load gently: a motor crosses a gap without force; against a spring it needs one",
+        "impact_backlash": "look at the motor after it has crossed the gap: elastic stops make it ring, rigid ones don't",
+        "input_deadzone": "turn the motor by hand: in a gap it is free while the load rests; a dead zone is in the command",
         "presliding": "measure the load's position too: pre-sliding moves the load itself, a gap lets only the motor move",
     },
 )

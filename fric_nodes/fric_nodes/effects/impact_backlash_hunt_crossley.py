@@ -77,7 +77,7 @@ EFFECT = Effect(
     rate=_rate,
     regime="after every reversal of the force: free motion through the gap, then blows; the harder, the less they rebound",
     looks_like={
-        "backlash": "look at the motor's velocity when it has crossed the gap: at elastic stops it rings, at rigid ones it jumps once",
-        "compliance": "push the resting load gently: through a gap the motor moves without force, against a spring it needs one",
+        "backlash": "look at the motor after it has crossed the gap: at elastic stops it rings, at rigid ones it doesn't",
+        "compliance": "push the resting load gently: a motor crosses a gap without force; against a spring it needs one",
     },
 )

@@ -6,7 +6,8 @@ Equations, with q the load's position and y the motor's:
 
 L is the force of the model's transmission terms (``backlash``, ``impact_backlash``, ``compliance``) over y - q; without any,
 both are rigidly coupled. The friction of the terms is the load's, F_m and c_m are the motor's own. The command acts on the
-motor, and the sensor sees the motor; the load's position is measured besides. Stepped by :mod:`fric_nodes.transmission`.
+motor, and the sensor sees the motor; the load's position is measured besides. Stepped by :mod:`fric_nodes.transmission`. A
+fit from force and motion sees the sum of the masses only, so it holds the load's unless it is asked to free it.
 Source: de Marchi 1998, mechanical positioning test bed (Walczyk and Craig 1991) with adjustable friction, backlash and
 compliance; the equations are those of the usual two-mass model.
 """
@@ -65,7 +66,9 @@ _TEST_BED = Plant(
     source="de Marchi 1998, mechanical positioning test bed; stepped as derived in fric_nodes.transmission",
     parameters=(
         Parameter("motor_mass", "m_m", "F s^2/x", "mass or moment of inertia of the motor", positive=True, linear=True),
-        Parameter("load_mass", "m_l", "F s^2/x", "mass or moment of inertia of the load", positive=True, linear=True),
+        Parameter(
+            "load_mass", "m_l", "F s^2/x", "mass or moment of inertia of the load", positive=True, linear=True, shape=True
+        ),
         Parameter("motor_coulomb", "F_m", "F", "Coulomb friction of the motor itself", lower=0.0, default=0.0, linear=True),
         Parameter("motor_viscous", "c_m", "F s/x", "viscous friction of the motor itself", lower=0.0, default=0.0, linear=True),
     ),
