@@ -41,8 +41,8 @@ class Topics:
         force_command: ``std_msgs/msg/Float64`` or ``fric_interfaces/msg/StampedForce`` [N or N m].
         reference: ``fric_interfaces/msg/Reference``.
         feedforward: as ``force_command``; not part of a record, but known to reports.
-        normal_load: ``std_msgs/msg/Float64`` [N].
-        temperature: ``std_msgs/msg/Float64`` [degC].
+        normal_load: as ``force_command`` [N], as are all further signals of a plant.
+        temperature: as ``normal_load`` [degC].
     """
 
     joint_states: str = "/joint_states"
@@ -201,8 +201,7 @@ class _Reading:
             raise BagError(where, "is empty: it holds no message", "record while the topics are being published")
         roles: dict[str, Topic] = {}
         types = {"joint_states": [JOINT_STATE], "force_command": [FLOAT64, STAMPED_FORCE], "reference": [REFERENCE]}
-        extra = [name for name in self.source.custom.get("fric.extra", "").split(",") if name]
-        optional = {name: [FLOAT64] for name in ("normal_load", "temperature", *extra)}
+        optional = {name: [FLOAT64, STAMPED_FORCE] for name in ("normal_load", "temperature", *self._extra())}
         needed = {"joint_states", "force_command"} if self.effort_from == "command" else {"joint_states"}
         for role, msgtypes in {**types, **optional}.items():
             if role == "force_command" and self.effort_from == "joint_states":
@@ -221,6 +220,18 @@ class _Reading:
             self.notes += [note] if note else []
         found = collect(self.source, list(roles.values()))
         return {role: found[topic.name] for role, topic in roles.items() if found[topic.name].data or role in needed}
+
+    def _extra(self) -> list[str]:
+        """Names of further signals: those that the bag's writer named, and whatever a plant of ours has measured besides."""
+        names = [name for name in self.source.custom.get("fric.extra", "").split(",") if name]
+        if "fric.joint" in self.source.custom:
+            commands = (self.topics.force_command, "/feedforward_force")
+            names += [
+                topic.name.removeprefix("/")
+                for topic in self.source.topics
+                if topic.msgtype in (FLOAT64, STAMPED_FORCE) and not topic.name.endswith(commands)
+            ]
+        return list(dict.fromkeys(names))
 
     def _effort(self, states: Series, raw: dict[str, Messages]) -> tuple[Array, bool, Mask]:
         """Effort at each joint state, whether it comes from the command, and where it can be used."""
@@ -316,7 +327,8 @@ class _Reading:
             if role == "reference":
                 signals["reference"] = hermite(at, times, fields["position"], fields["velocity"])
             else:
-                signals[role] = np.interp((at - times[0]) * 1e-9, (times - times[0]) * 1e-9, fields["data"])
+                values = fields["data" if "data" in fields else "force"]
+                signals[role] = np.interp((at - times[0]) * 1e-9, (times - times[0]) * 1e-9, values)
 
     def _units(self, given: Units | None) -> Units:
         if given is not None:

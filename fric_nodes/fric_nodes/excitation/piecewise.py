@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..excitation_kind import Points
 from ..record import Array
 
-__all__ = ["Piecewise"]
+__all__ = ["PEAK_ACCELERATION", "PEAK_VELOCITY", "TURN", "Piecewise"]
+
+PEAK_VELOCITY = 1.875
+"""Largest velocity of a minimum-jerk move, times its duration over its way."""
+
+PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
+"""Largest acceleration of a minimum-jerk move, times its duration squared over its way."""
+
+TURN = 0.3125
+"""How far a change from +v to -v within T goes on before it turns, over v T."""
 
 _DEGREE = 6
 
@@ -22,6 +33,7 @@ class Piecewise:
         self._starts: list[float] = []
         self._spans: list[float] = []
         self._pieces: list[Array] = []
+        self._arrays: tuple[Array, Array, Array] | None = None
         self.duration = 0.0
         self.position = 0.0
         self.velocity = 0.0
@@ -34,6 +46,7 @@ class Piecewise:
         self._starts.append(self.duration)
         self._spans.append(span)
         self._pieces.append(padded)
+        self._arrays = None
         self.duration += span
 
     def hold(self, span: float) -> None:
@@ -56,7 +69,7 @@ class Piecewise:
         self.velocity = velocity
 
     def move(self, position: float, span: float) -> None:
-        """From rest to rest at ``position`` [x] within ``span`` [s], with the least jerk.
+        """From rest to rest at ``position`` [x] within ``span`` [s], with the least jerk; at once when ``span`` is 0.
 
         q(s) = q_0 + (q_1 - q_0) (10 s^3 - 15 s^4 + 6 s^5) (Flash and Hogan 1985); the largest velocity is 1.875 (q_1 - q_0) /
         T, the largest acceleration 5.7735 (q_1 - q_0) / T^2.
@@ -67,11 +80,13 @@ class Piecewise:
 
     def at(self, time: Array) -> Points:
         """The motion at ``time`` [s], shape ``(n,)``."""
-        starts, spans = np.array(self._starts), np.array(self._spans)
+        if self._arrays is None:
+            self._arrays = np.array(self._starts), np.array(self._spans), np.array(self._pieces)
+        starts, spans, pieces = self._arrays
         number = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(starts) - 1)
         span = spans[number]
         s = np.clip((time - starts[number]) / span, 0.0, 1.0)
-        c = np.array(self._pieces)[number]
+        c = pieces[number]
         position, velocity, acceleration = np.zeros_like(s), np.zeros_like(s), np.zeros_like(s)
         for k in range(_DEGREE, -1, -1):  # Horner's rule, for the polynomial and its derivatives
             position = position * s + c[:, k]

@@ -14,12 +14,9 @@ import numpy as np
 
 from ..excitation_kind import Excitation, Trajectory
 from ..parameter import Parameter
-from .piecewise import Piecewise
+from .piecewise import PEAK_ACCELERATION, PEAK_VELOCITY, Piecewise
 
 __all__ = ["EXCITATION"]
-
-_PEAK_VELOCITY = 1.875
-_PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 
 
 def plan(values: Mapping[str, float], random: np.random.Generator) -> Trajectory:
@@ -33,7 +30,7 @@ def plan(values: Mapping[str, float], random: np.random.Generator) -> Trajectory
         way = abs(target - motion.position)
         if way == 0.0:
             continue
-        time = max(_PEAK_VELOCITY * way / values["speed"], math.sqrt(_PEAK_ACCELERATION * way / values["acceleration"]))
+        time = max(PEAK_VELOCITY * way / values["speed"], math.sqrt(PEAK_ACCELERATION * way / values["acceleration"]))
         motion.move(target, time)
         motion.hold(float(random.uniform(values["rest_low"], max(values["rest_high"], values["rest_low"]))))
     return motion

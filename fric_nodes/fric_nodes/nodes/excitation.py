@@ -1,4 +1,8 @@
-"""The motion that is wanted of the axis: gives ``reference``, or ``force_command`` for an open-loop excitation."""
+"""The motion that is wanted of the axis: gives ``reference``, or ``force_command`` for an open-loop excitation.
+
+Planned motions are sent ahead of the plant in lock-step, and by a timer in wall time. As soon as one of the excitations answers
+the motion (a feedback), the node gives one force for each joint state instead, in both clocks.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +17,10 @@ from fric_interfaces.msg import Reference
 
 from ..excitation import EXCITATIONS
 from ..excitation.sequence import Sequence
+from ..excitation_kind import OUTPUTS, ExcitationError
 from ..record import Units
 from .base import LOCK_STEP, PERIOD, LoopNode, wall_clock
-from .convert import from_seconds, nanoseconds, set_stamp
+from .convert import MessageError, from_seconds, joint_sample, nanoseconds, set_stamp
 from .forces import STAMPED, ForcePublisher
 from .main import run
 from .parameters import NodeParameter, from_declaration
@@ -32,14 +37,17 @@ PARAMETERS = (
     NodeParameter("start_delay", 1.0, "rest before the first", "s", 0.0, 1e6),
     NodeParameter("pause", 0.5, "rest after each", "s", 0.0, 1e6),
     NodeParameter("repeat", False, "go through them again and again"),
-    NodeParameter(
-        "output", "reference", "what is published; force: position is the force [N or N m]", choices=("reference", "force")
-    ),
+    NodeParameter("output", "reference", "what is published; force: position is the force [N or N m]", choices=OUTPUTS),
     STAMPED,
     NodeParameter(
         "look_ahead", 16, "lock-step: samples sent ahead of the plant; makes no difference to the numbers", "", 0, 64
     ),
     *(from_declaration(p, kind.id, Units()) for kind in EXCITATIONS.values() for p in kind.parameters),
+    *(
+        NodeParameter(f"{kind.id}.{text.name}", text.default, text.doc, choices=text.choices)
+        for kind in EXCITATIONS.values()
+        for text in kind.texts
+    ),
 )
 
 
@@ -53,12 +61,7 @@ class ExcitationNode(LoopNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("excitation", PARAMETERS, **options)
         settings = self.settings
-        random = np.random.default_rng(settings.integer("seed"))
-        parts = []
-        for name in settings.texts("kinds"):
-            kind = EXCITATIONS[name]
-            parts.append(kind.plan({p.name: settings.number(f"{name}.{p.name}") for p in kind.parameters}, random))
-        self._plan = Sequence(parts, settings.number("start_delay"), settings.number("pause"), settings.flag("repeat"))
+        self._plan = self._sequence()
         self._forces = ForcePublisher(self, "force_command") if settings.text("output") == "force" else None
         if self._forces is None:
             self._reference = Reference()
@@ -66,17 +69,34 @@ class ExcitationNode(LoopNode):
             self._references = self.create_publisher(Reference, "reference", SAMPLES)
         self._publisher = self._references if self._forces is None else self._forces.publisher
         self.get_logger().info(f"{', '.join(settings.texts('kinds'))}: {self._plan.duration:.1f} s")
-        if self.lock_step:
+        self._seen = -1
+        if self._plan.has_feedback:
+            self._first = 0 if self.lock_step else -1
+            self.create_subscription(JointState, "joint_states", self._on_motion, SAMPLES)
+        elif self.lock_step:
             self._period_ns = from_seconds(self.period)
             self._ahead = settings.integer("look_ahead")
             self._next = 0
-            self._seen = -1
             self._block: tuple[int, list[list[float]]] = (-1, [])
             self.create_subscription(JointState, "joint_states", self._on_state, SAMPLES)
         else:
             self._epoch, self._origin = wall_clock()
             self._start: int | None = None
             self.create_timer(self.period, self._tick)
+
+    def _sequence(self) -> Sequence:
+        settings = self.settings
+        random = np.random.default_rng(settings.integer("seed"))
+        output = settings.text("output")
+        parts = []
+        for name in settings.texts("kinds"):
+            kind = EXCITATIONS[name]
+            if output not in kind.outputs:
+                problem = f"{name} can't be published as a {output}"
+                raise ExcitationError("parameter 'output'", problem, f"set it to {' or '.join(kind.outputs)}")
+            numbers = {p.name: settings.number(f"{name}.{p.name}") for p in kind.parameters}
+            parts.append(kind.part(numbers, {t.name: settings.text(f"{name}.{t.name}") for t in kind.texts}, random))
+        return Sequence(parts, settings.number("start_delay"), settings.number("pause"), settings.flag("repeat"))
 
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report."""
@@ -90,6 +110,30 @@ class ExcitationNode(LoopNode):
         set_stamp(message.header.stamp, stamp)
         message.position, message.velocity, message.acceleration = position, velocity, acceleration
         self._references.publish(message)
+
+    # Feedback
+
+    def _on_motion(self, message: JointState) -> None:
+        """Answer a joint state; in lock-step time is its stamp, in wall time it begins with the first one."""
+        try:
+            state = joint_sample(message, self.joint)
+        except MessageError as error:
+            self.refuse("joint state", error)
+            return
+        if self._forces is None or not self.has_audience(self._publisher):
+            return
+        if self.lock_step and state.stamp == self._seen:
+            self.counters["repeated states"] += 1
+            self._forces.repeat()
+            return
+        if not self.lock_step and state.stamp <= self._seen:
+            self.refuse("joint state", "its stamp is not later than the last one's")
+            return
+        if self._first < 0:
+            self._first = state.stamp
+        self._seen = state.stamp
+        self._forces.publish(state.stamp, self._plan.force((state.stamp - self._first) * 1e-9, state.position))
+        self.deadlines.tick(time.monotonic())
 
     # Lock-step
 

@@ -1,4 +1,8 @@
-"""The machine to be controlled, simulated: takes ``force_command``, gives ``joint_states``.
+"""The machine to be controlled, simulated: takes ``force_command``, gives ``joint_states`` and what its plant measures besides.
+
+Any plant of the catalogue, with any terms, chosen by the model file. Each further signal of the plant (``normal_load``,
+``pressure_a``, ...) has a topic of its own under its name. It is typed like a force: a plain number in wall time; in lock-step,
+where only a stamp can say to which sample a number belongs, a stamped one (its field is called ``force``, whatever it holds).
 
 In wall time the axis moves by the time that really passes, and a command acts from the moment of its arrival; without a command
 for ``watchdog_time`` the drive gives no force. In lock-step it moves by one period when the command for the present sample
@@ -10,6 +14,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from sensor_msgs.msg import JointState
@@ -22,7 +27,7 @@ from ..model_file import read_model
 from ..shared_files import config_file
 from .base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent, wall_clock
 from .convert import MessageError, from_seconds, set_stamp
-from .forces import STAMPED, force_in, force_type
+from .forces import STAMPED, ForcePublisher, force_in, force_type
 from .lockstep import Stream
 from .main import run
 from .parameters import NodeParameter
@@ -35,9 +40,13 @@ PARAMETERS = (
     LOCK_STEP,
     NodeParameter("model_file", "", "fric-model/1 file of the axis; empty: the demo axis that comes with the package"),
     NodeParameter("resolution", 1e-7, "step of the encoder; 0: ideal", "m or rad", 0.0, 1.0),
+    NodeParameter("position_noise", 0.0, "standard deviation of a reading of the encoder", "m or rad", 0.0, 1.0),
+    NodeParameter("readings", 1, "readings of the encoder per sample; their mean is published", "", 1, 1000),
     NodeParameter("publish_velocity", True, "publish the difference quotient of positions as velocity; false: leave it empty"),
     NodeParameter("force_noise", 0.0, "standard deviation of the effort signal", "N or N m", 0.0, 1e9),
-    NodeParameter("force_limit", 1e6, "largest force of the drive", "N or N m", 0.0, 1e12),
+    NodeParameter(
+        "force_limit", 1e6, "largest force of the drive (or largest command, if it is no force)", "N or N m", 0.0, 1e12
+    ),
     NodeParameter("seed", 0, "of the noise", "", 0, 2**31 - 1),
     NodeParameter("watchdog_time", 0.1, "wall time: without a command for so long the force is zero", "s", 1e-3, 1e6),
     NodeParameter("retry_time", 0.2, "lock-step: repeat the state when no command has come for so long", "s", 1e-2, 1e3),
@@ -57,8 +66,10 @@ class PlantNode(LoopNode):
         super().__init__("plant", PARAMETERS, **options)
         settings = self.settings
         self._axis = SimulatedAxis(
-            read_model(settings.text("model_file") or config_file("demo_axis.yaml")),
+            read_model(_model_path(settings.text("model_file"))),
             resolution=settings.number("resolution"),
+            position_noise=settings.number("position_noise"),
+            readings=settings.integer("readings"),
             force_noise=settings.number("force_noise"),
             force_limit=settings.number("force_limit"),
             seed=settings.integer("seed"),
@@ -73,6 +84,9 @@ class PlantNode(LoopNode):
         self._state = JointState(name=[self.joint], position=[0.0])
         self._state.header.frame_id = self.joint
         self._publisher = self.create_publisher(JointState, "joint_states", SAMPLES)
+        self._signals = [ForcePublisher(self, name) for name in self._axis.signal_names]
+        self._values: list[float] = []
+        self._stamp = 0
         self.create_subscription(force_type(self), "force_command", self._on_command, SAMPLES)
         if self.lock_step:
             self._period_ns = from_seconds(self.period)
@@ -96,16 +110,25 @@ class PlantNode(LoopNode):
     def _measure(self, stamp: int) -> None:
         """Fill in the state at ``stamp`` [ns]."""
         state, measured = self._state, self._axis.measure()
+        self._values = self._axis.signals()
+        self._stamp = stamp
         set_stamp(state.header.stamp, stamp)
         state.position = [measured.position]
         state.velocity = [measured.velocity] if self._publish_velocity else []
         state.effort = [measured.effort]
 
+    def _publish(self) -> None:
+        """Publish the plant's signals, and then the state, which calls forth the next command."""
+        for publisher, value in zip(self._signals, self._values, strict=True):
+            publisher.publish(self._stamp, value)
+        self._publisher.publish(self._state)
+
     def _end_if_due(self) -> bool:
         if self._sample < self._last_sample:
             return False
         if not self.finished.done():
-            wait_until_sent(self, self._publisher, 5.0)
+            for publisher in (self._publisher, *(signal.publisher for signal in self._signals)):
+                wait_until_sent(self, publisher, 5.0)
             self.finish()
         return True
 
@@ -140,7 +163,7 @@ class PlantNode(LoopNode):
             self._axis.advance(force, self.period)
             self._sample += 1
             self._measure(self._sample * self._period_ns)
-            self._publisher.publish(self._state)
+            self._publish()
             self.deadlines.tick(time.monotonic())
             self._commands.forget_before(self._sample * self._period_ns)
         if self._sample >= self._last_sample and not self.finished.done():
@@ -154,7 +177,7 @@ class PlantNode(LoopNode):
         self._go_on()
         if self._sample == self._seen:
             self.counters["repeated states"] += 1
-            self._publisher.publish(self._state)
+            self._publish()
         self._seen = self._sample
 
     # Wall time
@@ -183,8 +206,14 @@ class PlantNode(LoopNode):
             self.get_logger().info("started")
         self._sample += 1
         self._measure(self._epoch + now - self._origin)
-        self._publisher.publish(self._state)
+        self._publish()
         self.deadlines.tick(now * 1e-9)
+
+
+def _model_path(given: str) -> Path:
+    """The model file that is meant: a path, or the name of a file that comes with fric; empty: the demo axis."""
+    path = Path(given or "demo_axis.yaml")
+    return config_file(path.name) if not given or (path.name == given and not path.exists()) else path
 
 
 def main(args: list[str] | None = None) -> None:

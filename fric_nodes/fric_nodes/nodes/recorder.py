@@ -30,6 +30,8 @@ DEFAULT_TOPICS = (
     "force_command",
     "reference",
     "feedforward_force",
+    "normal_load",
+    "temperature",
     "friction/model",
     "friction/estimate",
     "/diagnostics",  # one for the whole graph, whatever the namespace
