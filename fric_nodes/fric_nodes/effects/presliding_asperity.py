@@ -1,15 +1,15 @@
 """Pre-sliding, frictional memory and velocity weakening from a population of asperities that stick, slip and let go.
 
-Equation: F = sum_i k d_i over the asperities in contact; while the tip sticks, dd_i/dt = v; it slips at |d_i| = (y_i g/K) mu*(t_i),
-t_i the age of the contact, mu* = 1 + (M - 1)(1 - exp(-t_i/tau)); where the tip has slipped over its wave (length random, mean w_0)
-it lets go, what it held is lost, and it touches the next wave alpha w further. y_i are heights over their mean, g is the slip level
-of the other terms, K = k N/(1 + alpha) the stiffness of the asperities that touch, of N in all.
+Equation: F = sum_i k d_i over the asperities in contact; while the tip sticks, dd_i/dt = v; it slips at |d_i| = (y_i g/K)
+mu*(t_i), t_i the age of the contact, mu* = 1 + (M - 1)(1 - exp(-t_i/tau)); where the tip has slipped over its wave (length
+random, mean w_0) it lets go, what it held is lost, and it touches the next wave alpha w further. y_i are heights over their
+mean, g is the slip level of the other terms, K = k N/(1 + alpha) the stiffness of the asperities that touch, of N in all.
 Source: Al-Bender, Lampaert, Swevers 2004, Secs. 4 to 6; the population and what was settled about it is in
 :mod:`fric_nodes.friction.asperity`.
 
-The level g is what friction would be at high speed, where no contact has time to strengthen: with k_t* = K w_0/g, F is the paper's
-normalised force F_t* times g. Slow sliding takes nearly M g. So the Stribeck curve, the lag and the rise with dwell time come from
-the population itself, and the level is best left to the term ``coulomb`` and what scales it.
+The level g is what friction would be at high speed, where no contact has time to strengthen: with k_t* = K w_0/g, F is the
+paper's normalised force F_t* times g. Slow sliding takes nearly M g. So the Stribeck curve, the lag and the rise with dwell
+time come from the population itself, and the level is best left to the term ``coulomb`` and what scales it.
 
 The step is exact for constant velocity and level. A contact that is lost is a jump of the states; where the solver of a step
 interpolates between two trials, one of the few asperities that let go in one but not in the other is afterwards put back to
@@ -98,7 +98,7 @@ EFFECT = Effect(
         ),
         Parameter("time", "tau", "s", "time in which contacts grow old", positive=True),
         Parameter(
-            "gap", "alpha", "1", "mean way without contact over that with contact", lower=0.0, upper=10.0, default=1.0, shape=True
+            "gap", "alpha", "1", "way without contact over that with contact", lower=0.0, upper=10.0, default=1.0, shape=True
         ),
         Parameter("mass", "m", "F s^2/x", "mass of the asperities that touch, which swings out when they let go", lower=0.0,
                   default=0.0),
