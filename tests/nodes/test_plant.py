@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from fric_nodes.axis import SimulatedAxis
-from fric_nodes.bagio import iterate_raw
+from fric_nodes.bagio import iterate_raw, read_record
 from fric_nodes.excitation import EXCITATIONS
 from fric_nodes.excitation.sequence import Sequence
 from fric_nodes.model_file import read_model
@@ -161,6 +161,10 @@ def test_two_runs_with_signals_give_the_same_bag(graph: Graph) -> None:
     once, again = ([entry for entry in content if entry[0] > 0] for content in contents)
     assert once == again
     assert len(once) == 400 * len(topics)
+    # What the plant measured besides is part of the record, without anybody naming it.
+    record = read_record(bag)
+    assert set(names) <= set(record.extra)
+    assert all(np.ptp(record.extra[name]) > 0.0 for name in names)
 
 
 def test_in_wall_time_signals_are_plain_numbers(graph: Graph) -> None:

@@ -11,9 +11,9 @@ import math
 from typing import Any
 
 from ..effect import Effect, Place
-from ..first_order import mean_decay
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.first_order import mean_decay
 
 __all__ = ["EFFECT"]
 

@@ -2,7 +2,7 @@
 
 Equation: L = k e + k_3 e^3 + c de/dt, e = y - q; with play besides as in ``compliance/linear``. Free oscillations of the
 amplitude A have, to first order, the angular frequency sqrt((k + 3 k_3 A^2/4)/m) of the reduced mass m. The mean over a step
-is that of :mod:`fric_nodes.elastic`, which keeps the spring's energy exactly.
+is that of :mod:`fric_nodes.steps.elastic`, which keeps the spring's energy exactly.
 Source: de Marchi 1998, summed-mode compliance ("nonlinear spring force used at high amplitudes"); Duffing 1918 for the form.
 """
 
@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 from ..effect import Effect, Place
-from ..elastic import bonded, stops
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.elastic import bonded, stops
 
 __all__ = ["EFFECT"]
 

@@ -2,7 +2,7 @@
 
 Equation: L = k e + c de/dt, e = y - q. With play b of a backlash term besides, e is what lies beyond it,
 |y - q| - b/2 > 0, and the link only pushes: max(k e + c de/dt, 0). The mean over a step is that of
-:mod:`fric_nodes.elastic`, which keeps the spring's energy.
+:mod:`fric_nodes.steps.elastic`, which keeps the spring's energy.
 Source: Hooke; de Marchi 1998, classical compliance.
 """
 
@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 from ..effect import Effect, Place
-from ..elastic import bonded, stops
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.elastic import bonded, stops
 
 __all__ = ["EFFECT"]
 

@@ -1,7 +1,7 @@
 """Delay of the command: the force is what was commanded a fixed time ago (a bus, a computation).
 
 Equation: f(t) = u(t - T). The mean force over the step is handed on, so that a step longer than the delay, or one that
-isn't a part of it, gets the right share of either command. The line (:mod:`fric_nodes.delay_line`) is exact for commands
+isn't a part of it, gets the right share of either command. The line (:mod:`fric_nodes.steps.delay_line`) is exact for commands
 that are held for T/64 at least. A run starts without force.
 Source: transport delay.
 """
@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import delay_line
-from ..delay_line import begin, mean_before, put
 from ..effect import Effect, Place
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps import delay_line
+from ..steps.delay_line import begin, mean_before, put
 
 __all__ = ["EFFECT"]
 

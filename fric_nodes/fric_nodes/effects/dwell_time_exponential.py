@@ -1,6 +1,6 @@
 """Dwell time, exponential law: static friction settles at a value, as a stretched exponential of the time at rest.
 
-Equation: S = S_inf - (S_inf - S_0) exp(-(theta/tau)^beta), with theta the age of the contact (:mod:`fric_nodes.ageing`)
+Equation: S = S_inf - (S_inf - S_0) exp(-(theta/tau)^beta), with theta the age of the contact (:mod:`fric_nodes.steps.ageing`)
 and S the surplus over the slip level of the other terms.
 Source: Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 34: F = F_inf - (F_inf - F_0) exp(-C_1 t^C_2), after Gitis and
 Volpe. C_1 is written here as tau^(-C_2), a time instead of a number whose unit depends on C_2. The law keeps its form
@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 
-from ..ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 from ..effect import Context, Effect, Place
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 
 __all__ = ["EFFECT"]
 

@@ -1,6 +1,6 @@
 """Dwell time, power of an exponential law: static friction that starts from nothing and settles at a value.
 
-Equation: S = S_inf (1 - exp(-(theta/tau)^beta))^gamma, with theta the age of the contact (:mod:`fric_nodes.ageing`) and S
+Equation: S = S_inf (1 - exp(-(theta/tau)^beta))^gamma, with theta the age of the contact (:mod:`fric_nodes.steps.ageing`) and S
 the surplus over the slip level of the other terms.
 Source: Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 35: F = F_inf [1 - exp(-C_1 t^C_2)]^C_3, after Gitis and Volpe.
 The law holds for the whole of friction there, which it lets start at zero; as a surplus it is the whole where no other
@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 
-from ..ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 from ..effect import Context, Effect, Place
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 
 __all__ = ["EFFECT"]
 

@@ -1,6 +1,6 @@
 """Dwell time, hyperbolic law: static friction settles at a value, slowly at the end.
 
-Equation: S = S_0 + (S_inf - S_0) theta / (theta + tau), with theta the age of the contact (:mod:`fric_nodes.ageing`) and
+Equation: S = S_0 + (S_inf - S_0) theta / (theta + tau), with theta the age of the contact (:mod:`fric_nodes.steps.ageing`) and
 S the surplus over the slip level of the other terms.
 Source: Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 36, after Gitis and Volpe. The print begins with F_inf and
 falls to F_0 with time, F_inf - (F_inf - F_0) t/(t + C_1), while the text below it says that all functions rise; taken
@@ -9,10 +9,10 @@ from F_0 upwards it does. (So does F_inf - (F_inf - F_0) C_1/(t + C_1), which is
 
 from __future__ import annotations
 
-from ..ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 from ..effect import Context, Effect, Place
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 
 __all__ = ["EFFECT"]
 

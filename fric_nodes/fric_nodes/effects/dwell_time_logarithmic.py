@@ -1,6 +1,6 @@
 """Dwell time, logarithmic law: static friction rises without end, by the same amount with every decade of rest.
 
-Equation: S = S_0 + S_e log(1 + theta/tau), with theta the age of the contact (:mod:`fric_nodes.ageing`) and S the surplus
+Equation: S = S_0 + S_e log(1 + theta/tau), with theta the age of the contact (:mod:`fric_nodes.steps.ageing`) and S the surplus
 over the slip level of the other terms.
 Source: Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 39, after Gitis and Volpe. The print begins with F_inf and
 falls without end, F_inf - (F_inf - F_0) log(C_1 t + 1), while the text below it says that all functions rise: from F_0
@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import math
 
-from ..ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 from ..effect import Context, Effect, Place
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 
 __all__ = ["EFFECT"]
 

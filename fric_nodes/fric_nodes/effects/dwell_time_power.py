@@ -1,6 +1,6 @@
 """Dwell time, power law: static friction rises without end, as Coulomb found it.
 
-Equation: S = S_1 (theta / 1 s)^beta, with theta the age of the contact (:mod:`fric_nodes.ageing`) and S the surplus over
+Equation: S = S_1 (theta / 1 s)^beta, with theta the age of the contact (:mod:`fric_nodes.steps.ageing`) and S the surplus over
 the slip level of the other terms.
 Source: Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 37: F = F_k + C_1 t^C_2, after Gitis and Volpe, where F_k is
 kinetic friction: the surplus over it is the law itself. C_1 is S_1 over 1 s to the power C_2.
@@ -8,10 +8,10 @@ kinetic friction: the surplus over it is the law itself. C_1 is S_1 over 1 s to 
 
 from __future__ import annotations
 
-from ..ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 from ..effect import Context, Effect, Place
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 
 __all__ = ["EFFECT"]
 

@@ -1,7 +1,7 @@
 """Dwell time, square-root law: static friction settles at a value, with a tail that falls as one over the root of time.
 
 Equation: S = S_inf / ((rho - 1) / sqrt(theta/tau + 1) + 1), rho = S_inf/S_0, with theta the age of the contact
-(:mod:`fric_nodes.ageing`) and S the surplus over the slip level of the other terms.
+(:mod:`fric_nodes.steps.ageing`) and S the surplus over the slip level of the other terms.
 Source: Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 38, after Gitis and Volpe. The scanned fraction is taken as F =
 F_inf / ((F_inf/F_0 - 1) / sqrt(C_1 t + 1) + 1), the arrangement of its parts that is F_0 at t = 0 and F_inf in the end;
 C_1 is 1/tau. The law interpolates 1/F and so changes its form when a level is taken off: as a surplus it is the printed
@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import math
 
-from ..ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 from ..effect import Context, Effect, Place
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 
 __all__ = ["EFFECT"]
 

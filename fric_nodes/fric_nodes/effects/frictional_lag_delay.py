@@ -5,17 +5,17 @@ speed rises through the falling part of the Stribeck curve, g lies above the cur
 friction over velocity grows with the frequency as sin(omega tau_L). In steady sliding g is g_0.
 Source: Hess and Soom 1990; quoted by Al-Bender, Lampaert, Swevers 2004, section 11.
 
-The past is kept in a line of a fixed number of cells (:mod:`fric_nodes.delay_line`) and read between them linearly. A run
+The past is kept in a line of a fixed number of cells (:mod:`fric_nodes.steps.delay_line`) and read between them linearly. A run
 starts as if the contact had always been as it is in its first step.
 """
 
 from __future__ import annotations
 
-from .. import delay_line
-from ..delay_line import put, value_before
 from ..effect import Context, Effect, Place
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps import delay_line
+from ..steps.delay_line import put, value_before
 
 __all__ = ["EFFECT"]
 

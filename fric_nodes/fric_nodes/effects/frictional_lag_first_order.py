@@ -15,9 +15,9 @@ from __future__ import annotations
 import math
 
 from ..effect import Context, Effect, Place
-from ..first_order import mean_decay
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.first_order import mean_decay
 
 __all__ = ["EFFECT"]
 

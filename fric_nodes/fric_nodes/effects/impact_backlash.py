@@ -29,9 +29,9 @@ from __future__ import annotations
 import math
 
 from ..effect import Effect, Place
-from ..elastic import stops
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.elastic import stops
 
 __all__ = ["EFFECT", "damping_for", "duration", "restitution"]
 

@@ -19,9 +19,9 @@ from __future__ import annotations
 import math
 
 from ..effect import Effect, Place
-from ..elastic import pushing
 from ..kernel import kernel
 from ..parameter import Parameter
+from ..steps.elastic import pushing
 
 __all__ = ["EFFECT", "restitution"]
 

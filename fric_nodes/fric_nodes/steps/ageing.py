@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import math
 
-from .effect import Context
+from ..effect import Context
+from ..kernel import kernel
+from ..parameter import Parameter
 from .first_order import mean_decay
-from .kernel import kernel
-from .parameter import Parameter
 
 __all__ = ["CREEP_LENGTH", "LOOKS_LIKE", "REGIME", "age", "grow_older", "renewal_rate"]
 
