@@ -13,6 +13,7 @@ from .effect import Context
 __all__ = [
     "ACCELERATION",
     "MEMORY",
+    "N_STATES",
     "RIGID",
     "SEEN",
     "SEEN_RATE",
@@ -41,6 +42,9 @@ ACCELERATION = False
 
 MEMORY = False
 """True when a term of the contact has memory."""
+
+N_STATES = 2
+"""Number of the plant's mechanical states."""
 
 SEEN = 0
 """Index of the state that the sensor reports as position."""

@@ -46,7 +46,7 @@ _IMPORTS = (
     "from typing import Any",
     "from fric_nodes.assembled import Inner, Surroundings",
     "from fric_nodes.effect import Context",
-    "from fric_nodes.kernel import kernel, loop",
+    "from fric_nodes.kernel import kernel, local_array, loop",
 )
 
 
@@ -78,7 +78,7 @@ def _loops_for(plant: Plant, effects: tuple[Effect, ...]) -> Loops:
     module = _import(source, _fingerprint(plant, effects, source))
     n_constants = _counter(plant, effects)
     names = [function.__name__ for function in loops.LOOPS]
-    return Loops(*(_with_work_space(getattr(module, name), len(plant.states), n_constants) for name in names))
+    return Loops(*(_with_work_space(getattr(module, name), n_constants) for name in names))
 
 
 def _counter(plant: Plant, effects: tuple[Effect, ...]) -> Callable[[Array], int]:
@@ -98,7 +98,7 @@ def _counter(plant: Plant, effects: tuple[Effect, ...]) -> Callable[[Array], int
     return count
 
 
-def _with_work_space(loop: Callable[..., None], n_states: int, n_constants: Callable[[Array], int]) -> Callable[..., None]:
+def _with_work_space(loop: Callable[..., None], n_constants: Callable[[Array], int]) -> Callable[..., None]:
     """``loop`` with its work space, the last arguments, made anew for each call, so that threads don't meet."""
     parameters = list(inspect.signature(getattr(loop, "py_func", loop)).parameters)
     if "z" not in parameters:
@@ -106,7 +106,7 @@ def _with_work_space(loop: Callable[..., None], n_states: int, n_constants: Call
     z = parameters.index("z")
 
     def call(*arguments: Any) -> None:
-        work = np.empty(n_states), np.empty(2 * arguments[z].shape[0]), np.zeros(n_constants(arguments[0]))
+        work = np.empty(2 * arguments[z].shape[0]), np.zeros(n_constants(arguments[0]))
         loop(*arguments, *work)
 
     return call
@@ -185,6 +185,7 @@ def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
         f"RIGID = {all(effect.slip is None for effect in effects)}",
         f"ACCELERATION = {any(effect.uses_acceleration for effect in effects)}",
         f"MEMORY = {any(effect.remember is not None for effect in effects)}",
+        f"N_STATES = {len(plant.states)}",
         f"SEEN, SEEN_RATE = {plant.encoder}",
         "@kernel\ndef unpacked(p):",
         f"    return ({''.join(f'p[{k}], ' for k in range(n_parameters))})",
@@ -214,8 +215,11 @@ def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
 
 
 def _summing(head: str, body: list[str]) -> list[str]:
-    """A function that starts from ``total = 0.0``, lets each line of ``body`` change it, and returns it."""
-    return [f"@kernel\ndef {head}:", "    total = 0.0", *body, "    return total"]
+    """A function that starts from zero, lets each line of ``body`` change it, and returns it.
+
+    The zero is the negative one, the only number to which adding doesn't cost an addition: 0.0 + -0.0 isn't -0.0.
+    """
+    return [f"@kernel\ndef {head}:", "    total = -0.0", *body, "    return total"]
 
 
 def _plain(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -28,6 +28,7 @@ Source: set-valued Coulomb friction as in Acary and Brogliato 2008, chapter 1; t
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from .assembled import ACCELERATION, RIGID, Inner, Surroundings, force, level, own, slip
@@ -128,7 +129,7 @@ def slide(p: Any, m: float, x: Any, x_next: Any, s: Inner, u: float, h: float, a
     left = h
     impulse = 0.0
     for _ in range(8):  # stops and starts within one step; more only when the step is far too long
-        side = 1.0 if v > 0.0 else -1.0
+        side = math.copysign(1.0, v)
         push = 0.0
         if v == 0.0:
             c = Context(q, 0.0, 1.0, around.time, around.load, around.temperature, 0.0, left, s.memory)
@@ -142,7 +143,10 @@ def slide(p: Any, m: float, x: Any, x_next: Any, s: Inner, u: float, h: float, a
                     return push
                 impulse += push * left
                 break
-        w, friction = solve(p, m, s, q, v, u, left, side, around)
+            # Apart from the moving body's, so that nothing has to be chosen on the way from one velocity to the next.
+            w, friction = solve(p, m, s, q, 0.0, u, left, side, around)
+        else:
+            w, friction = solve(p, m, s, q, v, u, left, side, around)
         v_1 = 2.0 * w - v
         if v_1 * side >= 0.0:
             q += left * w

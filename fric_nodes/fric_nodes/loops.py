@@ -10,6 +10,7 @@ from typing import Any
 
 from .assembled import (
     MEMORY,
+    N_STATES,
     RIGID,
     SEEN,
     SEEN_RATE,
@@ -26,7 +27,7 @@ from .assembled import (
     unpacked,
 )
 from .effect import Context
-from .kernel import kernel
+from .kernel import kernel, local_array
 
 __all__ = ["LOOPS", "advance", "observe", "predict", "respond", "simulate"]
 
@@ -36,7 +37,7 @@ def advance(p: Any, x: Any, x_next: Any, s: Inner, u: float, h: float, around: S
     """One step of the plant and of what its terms remember; ``x`` and ``s.z`` are led on in place."""
     q, v = x[0], x[1]
     friction = step(p, x, x_next, s, u, h, around)
-    for j in range(x.shape[0]):
+    for j in range(N_STATES):
         x[j] = x_next[j]
     if not RIGID:
         for j in range(s.z.shape[0]):
@@ -54,10 +55,10 @@ def advance(p: Any, x: Any, x_next: Any, s: Inner, u: float, h: float, around: S
 
 
 def simulate(
-    p: Any, u: Any, h: float, n_sub: int, t_0: float, load: Any, temperature: Any, x: Any, z: Any, memory: Any,
-    x_out: Any, friction_out: Any, applied_out: Any, x_next: Any, z_next: Any, constants: Any,
+    p: Any, u: Any, h: float, n_sub: int, t_0: float, load: Any, temperature: Any, states: Any, z: Any, memory: Any,
+    x_out: Any, friction_out: Any, applied_out: Any, z_next: Any, constants: Any,
 ) -> None:  # fmt: skip
-    """Lead the states ``x``, ``z`` and ``memory``, in place, over ``len(u)`` intervals of ``h`` [s] in ``n_sub`` steps each.
+    """Lead ``states``, ``z`` and ``memory``, in place, over ``len(u)`` intervals of ``h`` [s] in ``n_sub`` steps each.
 
     ``u[k]`` is commanded over the whole interval k. ``x_out[k]`` is the mechanical state at the end of interval k,
     ``friction_out[k]`` the contact's mean friction force [F] over it and ``applied_out[k]`` the mean of what comes out of the
@@ -65,8 +66,12 @@ def simulate(
     """
     prepare(p, constants)
     p = unpacked(p)
+    x, x_next = local_array(N_STATES), local_array(N_STATES)
+    for j in range(N_STATES):
+        x[j] = states[j]
     s = Inner(z, z_next, memory, constants)
     h_sub = h / n_sub
+    each = 1.0 / n_sub
     for k in range(u.shape[0]):
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
@@ -77,15 +82,17 @@ def simulate(
             given = command(u[k], h_sub, memory, p)
             applied += given
             total += advance(p, x, x_next, s, given, h_sub, around)
-        for j in range(x.shape[0]):
+        for j in range(N_STATES):
             x_out[k, j] = x[j]
-        friction_out[k] = total / n_sub
-        applied_out[k] = applied / n_sub
+        friction_out[k] = total * each
+        applied_out[k] = applied * each
+    for j in range(N_STATES):
+        states[j] = x[j]
 
 
 def predict(
     p: Any, t: Any, q: Any, v: Any, a: Any, h: float, load: Any, temperature: Any, z: Any, memory: Any, u_out: Any,
-    friction_out: Any, x_next: Any, z_next: Any, constants: Any,
+    friction_out: Any, z_next: Any, constants: Any,
 ) -> None:  # fmt: skip
     """Force that has to come out of the command path for the motion ``q``, ``v``, ``a``, all of shape ``(n_samples,)``.
 
@@ -114,8 +121,8 @@ def predict(
 
 def observe(
     p: Any, u: Any, y: Any, h: Any, n_sub: int, load: Any, temperature: Any,
-    alpha: float, beta: float, noise: float, x: Any, z: Any, memory: Any, innovation: Any,
-    x_next: Any, z_next: Any, constants: Any,
+    alpha: float, beta: float, noise: float, states: Any, z: Any, memory: Any, innovation: Any,
+    z_next: Any, constants: Any,
 ) -> None:  # fmt: skip
     """Follow the measured positions ``y``: predict each from the state before it, then correct position and velocity.
 
@@ -125,6 +132,9 @@ def observe(
     """
     prepare(p, constants)
     p = unpacked(p)
+    x, x_next = local_array(N_STATES), local_array(N_STATES)
+    for j in range(N_STATES):
+        x[j] = states[j]
     s = Inner(z, z_next, memory, constants)
     t = 0.0
     for k in range(u.shape[0]):
@@ -140,6 +150,8 @@ def observe(
         if not (RIGID and x[SEEN_RATE] == 0.0 and abs(e) <= 3.0 * noise):
             x[SEEN_RATE] += beta * e / h[k]
         t += h[k]
+    for j in range(N_STATES):
+        states[j] = x[j]
 
 
 def respond(p: Any, u: Any, h: float, n_sub: int, memory: Any, applied_out: Any) -> None:

@@ -49,9 +49,8 @@ def bench(
         table.add_column("goal")
         for figure in figures:
             mark = "" if figure.reached is None else " reached" if figure.reached else " missed"
-            table.add_row(
-                figure.name, f"{figure.value:.4g} {figure.unit}", f"{figure.goal} {figure.unit}{mark}" if figure.goal else ""
-            )
+            unit = "" if figure.unit == "1" else f" {figure.unit}"
+            table.add_row(figure.name, f"{figure.value:.4g}{unit}", f"{figure.goal}{unit}{mark}" if figure.goal else "")
         Console(highlight=False).print(table)
     if any(figure.reached is False for figure in figures):
         raise typer.Exit(1)

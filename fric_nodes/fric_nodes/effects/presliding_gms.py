@@ -117,7 +117,7 @@ def slip(
     s = 1.0 if v >= 0.0 else -1.0
     x = abs(v) * h
     r = attraction * h / level
-    e, e_mean = -1.0, 0.0  # of what slides towards its limit; worked out when first needed
+    e, e_mean = fading(r)  # of what slides towards its limit; here, not when first needed, so that elements don't wait for it
     bent = 0.0
     followed = 0.0
     for n in range(m):
@@ -129,8 +129,6 @@ def slip(
             if gap == 0.0:
                 end, mean = d, d
             elif x >= -r * gap:
-                if e < 0.0:
-                    e, e_mean = fading(r)
                 end, mean = limit + gap * e, limit + gap * e_mean
             else:
                 end, mean = pulled_up(d, limit, x, r)
