@@ -336,7 +336,7 @@ def _run() -> Evidence:
 
 
 VERIFICATION = Verification(
-    id="quarter_car",
+    id="quarter-car",
     title="Quarter car on lubricated bearings: sticks, then follows without oscillation",
     source="Al-Zughaibi 2018, Eqs. 1-34, Figs. 2-13, Table 1; the same equations integrated by Radau's method",
     run=_run,
