@@ -28,7 +28,7 @@ setup(
     maintainer=MANIFEST.findtext("maintainer"),
     maintainer_email=MANIFEST.find("maintainer").get("email"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "**/*.html", "**/*.c", "**/*.h", "**/*.css", "**/*.js", "**/*.json", "**/*.svg", "**/*.yaml"]},
+    package_data={NAME: ["py.typed", *(f"**/*.{kind}" for kind in ("html", "css", "js", "json", "svg", "yaml", "c", "h"))]},
     data_files=[
         ("share/ament_index/resource_index/packages", from_here([HERE / "resource" / NAME])),
         (f"share/{NAME}", from_here([HERE / "package.xml"])),

@@ -30,6 +30,7 @@ class Options:
         freed: names of shape parameters to fit as well.
         robust: weigh down outliers (Huber) instead of plain least squares.
         horizon: length of the free runs of an output-error fit [s]; None: the whole recording in one run.
+        gains: P [F/x] and D [F s/x] of the feedback under which each recording was made, for oscillations; empty: not given.
     """
 
     cutoff: float | None = None
@@ -39,6 +40,7 @@ class Options:
     freed: tuple[str, ...] = ()
     robust: bool = False
     horizon: float | None = None
+    gains: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,9 @@ def score(model: Model, records: Sequence[Record], options: Options, found: Equa
     use = found.sliding
     force = driving_force(model, found)[use]
     error = force - found.rows(lambda stretch: force_along(model, stretch))[use]
+    if not np.any(force):
+        # A free motion: the error of m a = u - F is the same on both sides, and is related to the one that isn't zero.
+        force = found.rows(lambda stretch: force_along(model.with_terms(()), stretch))[use]
     spread = force - float(np.mean(force))
     off = np.concatenate([free_run(model, stretch) - stretch.raw_position for stretch in found.stretches])
     return Score(
