@@ -11,6 +11,7 @@ import pytest
 from fric_nodes.identification import METHODS
 from fric_nodes.identification.equations import nominal_conditions, surroundings
 from fric_nodes.identification.result import Identification, IdentificationError, Options
+from fric_nodes.identification.scoring import score
 from fric_nodes.model import Model, Term, build_model, term
 from fric_nodes.record import Record, RecordError
 from scipy import signal
@@ -272,3 +273,16 @@ def test_a_command_path_stands_between_the_recorded_effort_and_the_force(path: T
         assert without.model.value("coulomb.force") == pytest.approx(coulomb + 3.0, abs=0.3)
     else:
         assert without.train.noe > 2.0 * found.train.noe
+
+
+def test_a_free_motion_is_scored_against_its_inertial_force() -> None:
+    time = np.arange(8000) * 1e-3
+    decay, omega = 0.2, 6.0
+    position = 0.1 * np.exp(-decay * time) * np.cos(omega * time)
+    stiffness, viscous = 2.0 * (omega**2 + decay**2), 2.0 * 2.0 * decay
+    terms = [term("stiffness", stiffness=stiffness), term("viscous", coefficient=viscous)]
+    found = score(build_model("rigid", {"mass": 2.0}, terms), [Record(time, position, 0.0 * time)], Options(cutoff=50.0))
+    assert found.relative_force_error_percent < 1.0
+    off = score(build_model("rigid", {"mass": 2.2}, terms), [Record(time, position, 0.0 * time)], Options(cutoff=50.0))
+    # A mass that is 10 % off leaves 10 % of the true inertial force, which is 1/1.1 of the model's own.
+    assert off.relative_force_error_percent == pytest.approx(100.0 * 0.2 / 2.2, rel=0.02)
