@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -94,6 +94,15 @@ class Identification:
         deviation = np.sqrt(np.diag(self.covariance))
         scale = np.where(deviation > 0, deviation, 1.0)
         return np.asarray(self.covariance / np.outer(scale, scale), dtype=np.float64)
+
+    @property
+    def attachments(self) -> Mapping[str, str]:
+        """What a method has found besides the model: texts of files to write beside it, by name."""
+        return {}
+
+    def remarks_on(self, validation: Sequence[Record]) -> tuple[str, ...]:
+        """What the method has to say about recordings that the fit has not seen, besides the model's score."""
+        return ()
 
 
 @dataclass(frozen=True, eq=False)
