@@ -20,6 +20,7 @@ def register(app: typer.Typer) -> None:
     verbs.command("effects", epilog="Example: fric model effects presliding")(effects)
     verbs.command("plants", epilog="Example: fric model plants")(plants)
     verbs.command("excitations", epilog="Example: fric model excitations")(excitations)
+    verbs.command("methods", epilog="Example: fric model methods")(methods)
     app.add_typer(verbs, name="model")
 
 
@@ -132,6 +133,13 @@ def excitations() -> None:
         ("excitation", "shows", "parameters"),
         ((key, e.shows, ", ".join(p.name for p in e.parameters)) for key, e in EXCITATIONS.items()),
     )
+
+
+def methods() -> None:
+    """List the methods of identification, and the experiment that each of them needs."""
+    from ..identification import METHODS
+
+    _list(("method", "needs", "source"), ((key, method.needs, method.source) for key, method in METHODS.items()))
 
 
 def _list(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
