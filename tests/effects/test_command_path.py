@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fric_nodes.control.feedforward import Feedforward
 from fric_nodes.effects import EFFECTS
 from fric_nodes.model import build_model, term
 from fric_nodes.simulate import Simulator, predict_force, simulate
@@ -108,8 +109,13 @@ def test_the_command_that_a_motion_needs_undoes_the_path() -> None:
     terms = [term("coulomb", force=2.0), term("input_deadzone", width=1.0), term("actuator_lag", time=0.01)]
     model = build_model("rigid", {"mass": 1.5}, terms)
     zero, v, a = np.zeros(3), np.array([0.1, -0.1, 0.1]), np.array([2.0, -2.0, -4.0])
+    needed = predict_force(model, zero, zero, v, a, 1e-3)
+    assert needed == pytest.approx([5.0, -5.0, -4.0])
     # A lag can't be undone from one sample; what has no memory can.
-    assert predict_force(model, zero, zero, v, a, 1e-3) == pytest.approx([6.0, -6.0, -5.0])
+    assert [model.uncommand(float(force)) for force in needed] == pytest.approx([6.0, -6.0, -5.0])
+    feedforward = Feedforward(1e-3, preview=0.0)
+    feedforward.set_model(model, at_once=True)
+    assert feedforward.step(0.0, 0.0, 0.1, 2.0) == pytest.approx(6.0)
 
 
 def test_a_lagged_force_starts_the_body_when_it_has_grown_to_break_away() -> None:
