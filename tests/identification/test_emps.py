@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -61,3 +62,21 @@ def test_online_ends_near_offline(emps: Record) -> None:
     offline = METHODS["inverse-dynamics"].fit(structure(), [emps], Options()).model
     for name, got in zip(found.names, found.values, strict=True):
         assert got == pytest.approx(offline.value(name), rel=0.03), name
+
+
+@pytest.mark.parametrize("method", ["inverse-dynamics", "prediction-error", "output-error"])
+def test_intervals_of_one_half_contain_the_estimate_of_the_other(emps: Record, method: str) -> None:
+    """Halves made of contiguous sixths in every way; the structure has the asymmetric friction that the axis shows."""
+    n = emps.n_samples
+    blocks = [emps.slice(k * n // 6, (k + 1) * n // 6) for k in range(6)]
+    options = Options(held=("asymmetry.force",))
+    hits = []
+    for ours in combinations(range(1, 6), 2):
+        halves = ([0, *ours], [k for k in range(1, 6) if k not in ours])
+        one, other = (
+            METHODS[method].fit(structure(term("asymmetry")), [blocks[k] for k in half], options).model for half in halves
+        )
+        for name in ("mass", "coulomb.force", "viscous.coefficient", "asymmetry.coefficient", "bias.force"):
+            off = abs(one.value(name) - other.value(name))
+            hits += [off <= 1.96 * model.standard_errors[name] for model in (one, other)]
+    assert np.mean(hits) >= 0.85

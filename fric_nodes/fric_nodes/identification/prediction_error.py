@@ -1,186 +1,246 @@
 """Prediction error: the parameters whose model, corrected at every sample, predicts the next position best.
 
-The model is simulated from sample to sample, so that what happens between samples (a body ringing on its bristles, a stop) is
-not filtered away, and its state is pulled to the measured position after each one, so that no error builds up through the
-integrator. Minimises the sum of squared innovations e_k = q_k - q_hat(k | k-1).
+What is predicted, and how the model follows the recording, is in :mod:`fric_nodes.identification.innovations`; the tracking
+index of its correction is the one with the smallest innovations.
 
-The correction is the steady-state Kalman filter of a double integrator whose acceleration is disturbed by the noise of the
-force, with standard deviation s_a, and whose position is read with noise s_q. Its gains follow from the tracking index
-L = s_a h^2 / s_q (Kalata 1984): r = (4 + L - sqrt(8 L + L^2)) / 4, alpha = 1 - r^2, beta = 2 (2 - alpha) - 4 sqrt(1 -
-alpha). The index is chosen from the data, as the one with the smallest innovations. With a right model the innovations are
-white, and least squares is maximum likelihood.
+The noise of the recorded force never moved the axis, yet it moves the model, and an innovation holds the model's answer to
+it. So does the noise of the position. Let e(theta) be the innovations. With small noise they are the answer to the true
+signals, which vanishes at the true parameters, plus a linear answer to the noise of mean square V(theta); the latter is
+smaller for a mass, a stiffness, or a damping that is too large, and the plain sum of squares ends up there. V can be known:
+noise like that of the recording, drawn once, is added to its signals, and V(theta) is the mean square of what that changes
+in the innovations. With C = mean e^2 at a reference point and V_0 the value there,
 
-Where the noise of the force rules (a large index), an innovation is h^2 / (2 m) times that noise, and its plain sum of squares
-would reward a mass that is too large. It is then weighed with the mass, e_k m: the force that is missing, regressed on a
-motion that is known well, which is free of that bias.
+    r(theta) = e(theta) / sqrt(1 + (V(theta) - V_0) / C)
 
-The fit starts from the values of inverse dynamics and, since a Stribeck
-velocity or a stiffness has wrong valleys of its own, from others over their range; the best after a few steps goes on.
-Source: Ljung 1999, section 7.2 and 7.4 (prediction errors of a state-space model).
+has a mean square that is smallest at the truth: E mean r^2 = C at the truth, whatever the slope of V, and more elsewhere.
+What is in C besides V, such as a force that acts without being recorded, stays as in plain least squares. Noise also changes
+the mean of the innovations, where it shakes a contact loose; the mean of what drawn noise and its opposite change is taken
+off e.
+
+How much of the fast part of the recorded force is noise, and how much did act, the position tells: noise is answered by the
+model and not by the axis. That share is the regression of e on what the fast part of the force changes in e, between 0 and
+1.
+
+Standard errors: the sum of the scores s_k = e_k e'_k - d_k d'_k, with d the answer to the drawn noise and ' a derivative, is
+zero at the estimate. Its derivative is E'E' - D'D' in the mean, without the noise in E, and its variance is that of
+correlated scores (:mod:`fric_nodes.identification.statistics`), which holds what the drawn noise adds to the error as well.
+
+The fit starts from the values of inverse dynamics and, since a Stribeck velocity or a stiffness has wrong valleys of its
+own, from others over their range; the best after a few steps goes on. Source: Ljung 1999, sections 7.2 and 7.4 (prediction
+errors of a state-space model). The correction for noise is derived here; it is of the kind of corrected scores (Nakamura
+1990), found by simulation.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.signal import savgol_filter
 
 from ..model import Model
-from ..record import Array, Record
-from ..simulate import intervals, substeps
+from ..record import Array, Index, Record
+from ..simulate import substeps
 from . import inverse_dynamics
 from .conclusion import Fitted, concluded, standard_errors
-from .equations import Equations, surroundings
+from .equations import Equations
 from .free_parameters import FreeParameters, candidates
+from .gauss_newton import Solution, minimise
+from .innovations import SETTLING, Run, excerpt, innovations, noise_of, runs_of
+from .problem import Problem
 from .result import Identification, Method, Options
-from .statistics import sandwich_covariance
+from .statistics import bartlett_lag, sandwich
 
-__all__ = ["METHOD", "Run", "fit", "innovations", "runs_of"]
+__all__ = ["METHOD", "fit", "problem"]
 
 _INDICES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
-_STEP_OF_RATE = 0.25  # coarser than a simulation's: from one sample to the next its error is far below any noise
-_FORCE_NOISE_RULES = 0.3  # tracking index from which the noise of the force outweighs that of the position
-_SETTLING = 20  # innovations dropped at the start of each run
+_STEP_OF_RATE = 0.15  # coarser than a simulation's: from one sample to the next its error is far below any noise
+_DIFFERENCE = 1e-3  # relative step of derivatives: wide enough to reach over the kinks of sticking
 _ENOUGH = 9000  # samples that the choice between starts looks at
-
-
-def _gains(index: float) -> tuple[float, float]:
-    """Alpha and beta for a tracking index."""
-    r = (4.0 + index - math.sqrt(8.0 * index + index * index)) / 4.0
-    alpha = 1.0 - r * r
-    return alpha, 2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha)
+_START_STEPS = 5
+_MOST_STEPS = 40
+_DRAWS = 3  # of the noise
+_NEARLY_ALL = 0.8  # of the innovations' power, from which on noise is taken to be all of it
+_ROUNDS = 3  # at most, of noise and tracking index found, and fit
+_SETTLED = 0.1  # change of the share of noise that needs no further round
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """A valid contiguous part of a recording as it is, uneven stamps and all.
+class _Fit:
+    """The innovations as a function of the free parameters, each relative to its value at the reference point.
 
     Attributes:
-        step: time between samples [s], shape ``(n,)``.
-        effort: force over each interval [F], shape ``(n,)``.
-        position: at the end of each interval [x], shape ``(n,)``.
-        start: position and velocity at the beginning [x], [x/s].
-        load: relative normal load, one value or ``(n,)``.
-        temperature: difference from reference [K], one value or ``(n,)``.
-        noise: of the position signal [x].
+        model: the reference point.
+        free: the free parameters.
+        runs: the recording.
+        drawn: the recording with more noise.
+        index: tracking index.
+        n_substeps: steps of the model per sample.
     """
 
-    step: Array
-    effort: Array
-    position: Array
-    start: tuple[float, float]
-    load: Array
-    temperature: Array
-    noise: float
+    model: Model
+    free: FreeParameters
+    runs: Sequence[Run]
+    drawn: Sequence[Sequence[Run]]
+    index: float
+    n_substeps: int
 
-    def part(self, first: int, last: int) -> Run:
-        """Intervals ``first`` to ``last`` (exclusive) as a run of their own."""
-        position = self.position[first:last]
-        begin = self.start
-        if first > 0:
-            before = float(self.position[first - 1])
-            begin = (before, float((position[0] - before) / self.step[first]))
-        load = self.load[first:last] if self.load.shape[0] > 1 else self.load
-        temperature = self.temperature[first:last] if self.temperature.shape[0] > 1 else self.temperature
-        return Run(self.step[first:last], self.effort[first:last], position, begin, load, temperature, self.noise)
+    @property
+    def scale(self) -> Array:
+        """Size of the free parameters, shape ``(n_free,)``."""
+        size = np.abs(self.model.values[self.free.index])
+        size[size == 0.0] = 1.0
+        return size
 
+    def at(self, point: Array) -> Model:
+        """The model at a point."""
+        values = self.model.values
+        values[self.free.index] = point * self.scale
+        return self.model.with_values(values)
 
-def runs_of(record: Record) -> list[Run]:
-    """The valid contiguous parts of ``record`` that are long enough to learn from."""
-    load, temperature = surroundings(record)
-    bounds = np.flatnonzero(np.diff(np.concatenate([[False], record.mask, [False]]).astype(np.int8)))
-    found = []
-    for first, last in zip(bounds[::2].tolist(), bounds[1::2].tolist(), strict=True):
-        if last - first < 10 * _SETTLING:
-            continue
-        position = record.position[first:last]
-        step = np.diff(record.time[first:last])
-        found.append(
-            Run(
-                step=step,
-                effort=np.ascontiguousarray(intervals(record.effort[first:last], record.effort_hold)),
-                position=np.ascontiguousarray(position[1:]),
-                start=(float(position[0]), float((position[1] - position[0]) / step[0])),
-                load=load[first : last - 1] if load.shape[0] > 1 else load,
-                temperature=temperature[first : last - 1] if temperature.shape[0] > 1 else temperature,
-                noise=_position_noise(position),
-            )
+    def both(self, point: Array) -> tuple[Array, Array]:
+        """Innovations without what noise adds to their mean [x], shape ``(n,)``, and parts of their noise, ``(n_parts, n)``.
+
+        The sum of the parts' mean squares is that of the noise. Drawn noise and its opposite give, by half their difference,
+        the part that is linear in it, and by half their sum what it adds to the mean: friction that noise shakes loose.
+        """
+        model = self.at(point)
+        plain = innovations(model, self.runs, self.index, self.n_substeps)
+        if not self.drawn:
+            return plain, np.empty((0, plain.shape[0]))
+        answers = [innovations(model, runs, self.index, self.n_substeps) - plain for runs in self.drawn]
+        up, down = np.array(answers[::2]), np.array(answers[1::2])
+        odd, even = 0.5 * (up - down), 0.5 * (up + down)
+        n = odd.shape[0]
+        middle = np.mean(even, axis=0)
+        # The mean of n draws is taken off: the recording's own deviation from it and the draws' are left.
+        rest = (even - middle) * math.sqrt((1.0 + 1.0 / n) / max(n - 1, 1))
+        return plain - middle, np.concatenate([odd / math.sqrt(n), rest])
+
+    def problem(self) -> Problem:
+        """The corrected sum of squares around the reference point, whose innovations are of the order of one there."""
+        scale = self.scale
+        lower, upper = self.free.lower / scale, self.free.upper / scale
+        start = np.clip(self.model.values[self.free.index] / scale, lower, upper)
+        plain, changed = self.both(start)
+        share = _rated(float(np.mean(plain**2)), _power(changed))
+
+        def weigh(point: Array, weight: Array) -> Array:
+            # Noise counts with the weight of the samples that it is in.
+            square = max(float(weight @ plain**2), 1e-300)
+            found, moved = self.both(point)
+            noise = share * float(np.sum((moved**2 - changed**2) @ weight))
+            unit = square / plain.shape[0] * max(1.0 + noise / square, 1e-3)
+            return np.asarray(np.sqrt(weight) * found / math.sqrt(unit), dtype=np.float64)
+
+        def residual(point: Array) -> Array:
+            return weigh(point, np.ones(plain.shape[0]))
+
+        starts = np.cumsum([0, *(run.effort.shape[0] - SETTLING for run in self.runs)])[:-1]
+        return Problem(self.free.names, residual, start, lower, upper, scale, starts, weigh)
+
+    def minimised(self, max_iterations: int) -> Solution:
+        """Where the corrected sum of squares is smallest, from the reference point on."""
+        found = self.problem()
+        return minimise(
+            found.residual, found.point, found.lower, found.upper, difference=_DIFFERENCE, max_iterations=max_iterations
         )
-    return found
+
+    def covariance(self, starts: Index) -> Array:
+        """Of the estimate that the reference point is, shape ``(n_free, n_free)``."""
+        n = self.free.index.shape[0]
+        scale = self.scale
+        middle = self.model.values[self.free.index] / scale
+        plain, changed = self.both(middle)
+        square, known = float(np.mean(plain**2)), _power(changed)
+        share = _rated(square, known)
+        slopes, noise_slopes = np.empty((n, plain.shape[0])), np.empty((n, *changed.shape))
+        for k in range(n):
+            ahead, behind = middle.copy(), middle.copy()
+            ahead[k] = min(middle[k] + _DIFFERENCE, self.free.upper[k] / scale[k])
+            behind[k] = max(middle[k] - _DIFFERENCE, self.free.lower[k] / scale[k])
+            above, below = self.both(ahead), self.both(behind)
+            slopes[k] = (above[0] - below[0]) / (ahead[k] - behind[k])
+            noise_slopes[k] = (above[1] - below[1]) / (ahead[k] - behind[k])
+        score = slopes * plain
+        information = slopes @ slopes.T
+        if self.drawn:
+            noise_score = np.einsum("knt,nt->kt", noise_slopes, changed)
+            score = score - share * noise_score
+            if share != 1.0:
+                # The size of the noise is itself an estimate, from the same innovations.
+                excess = plain**2 - share * np.sum(changed**2, axis=0)
+                score = score - np.outer(np.sum(noise_score, axis=1) / np.sum(changed**2), excess)
+            corrected = information - share * np.einsum("knt,lnt->kl", noise_slopes, noise_slopes)
+            information = _definite(corrected, information)
+        lag = max(bartlett_lag(each) for each in score)
+        return sandwich(information, score.T, lag, starts) * np.outer(scale, scale)
 
 
-def innovations(model: Model, run: Run, index: float) -> Array:
-    """Measured minus predicted position at each sample but the first ones [x]."""
-    state = np.ascontiguousarray(model.plant.start(np.array(model.plant_values), *run.start), dtype=np.float64)
-    loops = model.loops
-    found = np.empty(run.effort.shape[0])
-    alpha, beta = _gains(index)
-    n_steps = substeps(model, float(np.median(run.step)), _STEP_OF_RATE)
-    loops.observe(
-        model.values, run.effort, run.position, run.step, n_steps, run.load, run.temperature, alpha, beta, run.noise,
-        state, *model.inner_states(), found,
-    )  # fmt: skip
-    return found[_SETTLING:]
+def _definite(corrected: Array, plain: Array) -> Array:
+    """``corrected``, of which noise may leave less than a twentieth of ``plain`` in some direction, kept above that."""
+    values, vectors = np.linalg.eigh(plain)
+    values = np.maximum(values, 1e-12 * values[-1])
+    root = vectors * np.sqrt(values)
+    inverse = (vectors / np.sqrt(values)).T
+    shares, directions = np.linalg.eigh(inverse @ corrected @ inverse.T)
+    inner = (directions * np.clip(shares, 0.05, None)) @ directions.T
+    return np.asarray(root @ inner @ root.T, dtype=np.float64)
 
 
-def _position_noise(position: Array) -> float:
-    """Noise of a position signal [x], from its third differences, which no smooth motion survives."""
-    return float(np.median(np.abs(np.diff(position, 3)))) / (0.6745 * math.sqrt(20.0))
+def _rated(square: float, known: float) -> float:
+    """By how much the power of the drawn noise is to be multiplied, where the innovations have the power ``square``.
+
+    Noise can't explain more than there is; and where it explains nearly all, what it lacks is the error of its own estimate.
+    """
+    return square / known if known > _NEARLY_ALL * square else 1.0
 
 
-def _minimise(
-    start: Model, free: FreeParameters, runs: Sequence[Run], index: float, n_steps: int
-) -> tuple[Array, Array, Array, bool]:
-    """Values, scaled innovations, their derivative, and whether the solver converged, from ``start`` on."""
-    values = start.values
-    scale = np.abs(values[free.index])
-    scale[scale == 0.0] = 1.0
-
-    inertia = start.plant.inertia(*start.plant_values)
-
-    def errors(scaled: Array) -> Array:
-        trial = values.copy()
-        trial[free.index] = scaled * scale
-        model = start.with_values(trial)
-        found = np.concatenate([innovations(model, run, index) for run in runs])
-        if index >= _FORCE_NOISE_RULES:
-            found = found * (model.plant.inertia(*model.plant_values) / inertia)
-        # A run that escapes must cost much, not break the solver.
-        return np.asarray(np.nan_to_num(found, nan=1e3, posinf=1e3, neginf=-1e3), dtype=np.float64)
-
-    point = np.clip(values[free.index], free.lower, free.upper) / scale
-    # Innovations are nanometres to micrometres: brought to one, so that the solver's tolerances mean something.
-    unit = 1.0 / max(float(np.sqrt(np.mean(errors(point) ** 2))), 1e-300)
-    answer = least_squares(
-        lambda scaled: unit * errors(scaled),
-        point,
-        bounds=(free.lower / scale, free.upper / scale),
-        x_scale="jac",
-        diff_step=1e-4,
-        xtol=1e-6,
-        ftol=1e-7,
-        max_nfev=n_steps,
-    )
-    values[free.index] = np.asarray(answer.x) * scale
-    return values, np.asarray(answer.fun), np.asarray(answer.jac) / scale, answer.status > 0
+def _power(parts: Array) -> float:
+    return float(np.sum(np.mean(parts**2, axis=1)))
 
 
-def _excerpt(runs: Sequence[Run]) -> list[Run]:
-    """As much of the beginning, the middle and the end of each run as it takes to choose between starts."""
-    total = sum(run.effort.shape[0] for run in runs)
-    share = min(1.0, _ENOUGH / total)
-    parts = []
+def _with_noise(runs: Sequence[Run], force_share: float) -> list[list[Run]]:
+    """Copies of the recording with noise like its own added and then taken off, the same at every call."""
+    random = np.random.default_rng(1)
+    drawn = []
+    for _ in range(_DRAWS):
+        up, down = [], []
+        for run in runs:
+            n = run.effort.shape[0]
+            white = random.standard_normal((2, n))
+            effort: Array = math.sqrt(force_share) * noise_of(run.effort) * white[0]
+            position: Array = run.noise * white[1]
+            up.append(run.moved(effort, position))
+            down.append(run.moved(-effort, -position))
+        drawn += [up, down]
+    return drawn
+
+
+def _share_that_is_noise(model: Model, runs: Sequence[Run], index: float, n_substeps: int) -> float:
+    """How much of the fast part of the recorded force did not act, as a share of its power."""
+    without = []
     for run in runs:
-        n = run.effort.shape[0]
-        length = int(share * n / 3)
-        if length < 10 * _SETTLING:
-            parts.append(run)
-            continue
-        parts += [run.part(first, first + length) for first in (0, (n - length) // 2, n - length)]
-    return parts
+        limit = 4.0 * noise_of(run.effort)
+        fast = np.clip(run.effort - savgol_filter(run.effort, 7, 3), -limit, limit)
+        without.append(run.moved(-fast, np.zeros_like(fast)))
+    left = innovations(model, runs, index, n_substeps)
+    answer = left - innovations(model, without, index, n_substeps)
+    power = float(answer @ answer)
+    return min(max(float(left @ answer) / power, 0.0), 1.0) if power > 0.0 else 0.0
+
+
+def _prepared(model: Model, free: FreeParameters, runs: Sequence[Run], force_share: float) -> _Fit:
+    """The fit around ``model``, whose innovations tell the tracking index."""
+    n_substeps = _substeps(model, runs)
+    index = min(_INDICES, key=lambda trial: float(np.sum(innovations(model, runs, trial, n_substeps) ** 2)))
+    return _Fit(model, free, runs, _with_noise(runs, force_share), index, n_substeps)
+
+
+def _substeps(model: Model, runs: Sequence[Run]) -> int:
+    return max(substeps(model, float(np.median(run.step)), _STEP_OF_RATE) for run in runs)
 
 
 def _other_starts(start: Model, free: FreeParameters, found: Equations) -> list[Model]:
@@ -204,12 +264,35 @@ def _best_start(start: Model, free: FreeParameters, runs: Sequence[Run], others:
         return start
     best, least = start, math.inf
     for trial in (start, *others):
-        values, _, _, _ = _minimise(trial, free, runs, _INDICES[-1], 8)
-        reached = trial.with_values(values)
-        cost = sum(float(np.sum(innovations(reached, run, _INDICES[-1]) ** 2)) for run in runs)
+        fit = _Fit(trial, free, runs, (), _INDICES[-1], _substeps(trial, runs))
+        reached = fit.at(fit.minimised(_START_STEPS).point)
+        cost = float(np.sum(innovations(reached, runs, _INDICES[-1], _substeps(reached, runs)) ** 2))
         if cost < least:
             best, least = reached, cost
     return best
+
+
+def _settled(model: Model, free: FreeParameters, runs: Sequence[Run]) -> tuple[Model, Solution, _Fit]:
+    """The corrected fit from ``model`` on: what it found, how it ended, and with which settings."""
+    rough = _prepared(model, free, runs, 0.0)
+    model = rough.at(replace(rough, drawn=()).minimised(_MOST_STEPS).point)
+    share = _share_that_is_noise(model, runs, rough.index, _substeps(model, runs))
+    for _ in range(_ROUNDS):
+        problem = _prepared(model, free, runs, share)
+        answer = problem.minimised(_MOST_STEPS)
+        model = problem.at(answer.point)
+        # Steps, tracking index and noise are those of the point before: where they change much, another round.
+        before, share = share, _share_that_is_noise(model, runs, problem.index, problem.n_substeps)
+        if abs(share - before) <= _SETTLED and _substeps(model, runs) <= problem.n_substeps:
+            break
+    return model, answer, problem
+
+
+def problem(model: Model, free: FreeParameters, records: Sequence[Record], found: Equations) -> Problem:
+    """The sum of squares that ``model`` is the minimum of, for what goes on from there."""
+    runs = [run for record in records for run in runs_of(record)]
+    share = _share_that_is_noise(model, runs, _prepared(model, free, runs, 0.0).index, _substeps(model, runs))
+    return _prepared(model, free.within_reach(model, found), runs, share).problem()
 
 
 def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
@@ -224,15 +307,13 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     free = free.without({name for name in free.names if name not in known})
     runs = [run for record in records for run in runs_of(record)]
     free = free.within_reach(start, found)
-    start = _best_start(start, free, _excerpt(runs), _other_starts(start, free, found))
-    index = min(_INDICES, key=lambda trial: sum(float(np.sum(innovations(start, run, trial) ** 2)) for run in runs))
-    values, left, jacobian, converged = _minimise(start, free, runs, index, 60)
-    lengths = [run.effort.shape[0] - _SETTLING for run in runs]
-    starts = np.cumsum([0, *lengths])[:-1]
-    covariance = sandwich_covariance(jacobian, left, np.ones(left.shape[0]), starts)
-    trouble = "" if converged else "not converged after 60 steps; start nearer to the machine's values (--model)"
-    fitted = Fitted(start.with_values(values), free, covariance, begun.found, begun.messages)
-    return concluded(METHOD.id, fitted, records, options, trouble)
+    model = _best_start(start, free, excerpt(runs, _ENOUGH), _other_starts(start, free, found))
+    starts = np.cumsum([0, *(run.effort.shape[0] - SETTLING for run in runs)])[:-1]
+    model, answer, problem = _settled(model, free, runs)
+    covariance = replace(problem, model=model).covariance(starts)
+    remedy = "start nearer to the machine's values (--model)"
+    trouble = "" if answer.converged else f"not converged after {_MOST_STEPS} steps; {remedy}"
+    return concluded(METHOD.id, Fitted(model, free, covariance, found, begun.messages), records, options, trouble)
 
 
 METHOD = Method(

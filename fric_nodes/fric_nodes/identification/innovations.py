@@ -1,0 +1,143 @@
+"""What a recording says at each sample that the model, corrected until the sample before, did not foresee.
+
+The model is simulated from sample to sample, so that what happens in between (a body ringing on its bristles, a stop) is not
+filtered away, and its state is pulled to the measured position after each one, so that no error builds up through the
+integrator. The correction is the steady-state Kalman filter of a double integrator whose acceleration is disturbed with
+standard deviation s_a, and whose position is read with noise s_q. Its gains follow from the tracking index L = s_a h^2 / s_q
+(Kalata 1984): r = (4 + L - sqrt(8 L + L^2)) / 4, alpha = 1 - r^2, beta = 2 (2 - alpha) - 4 sqrt(1 - alpha).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import comb
+
+from ..model import Model
+from ..record import Array, Record
+from ..simulate import intervals
+from .equations import surroundings
+
+__all__ = ["SETTLING", "Run", "excerpt", "innovations", "noise_of", "runs_of"]
+
+SETTLING = 20
+"""Innovations dropped at the start of each run."""
+
+_DIFFERENCES = 6  # of a signal, which leave its white noise and hardly any of its motion
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A valid contiguous part of a recording as it is, uneven stamps and all.
+
+    Attributes:
+        step: time between samples [s], shape ``(n,)``.
+        effort: force over each interval [F], shape ``(n,)``.
+        position: at the end of each interval [x], shape ``(n,)``.
+        start: position and velocity at the beginning [x], [x/s].
+        load: relative normal load, one value or ``(n,)``.
+        temperature: difference from reference [K], one value or ``(n,)``.
+        noise: of the position signal [x].
+    """
+
+    step: Array
+    effort: Array
+    position: Array
+    start: tuple[float, float]
+    load: Array
+    temperature: Array
+    noise: float
+
+    def part(self, first: int, last: int) -> Run:
+        """Intervals ``first`` to ``last`` (exclusive) as a run of their own."""
+        position = self.position[first:last]
+        begin = self.start
+        if first > 0:
+            before = float(self.position[first - 1])
+            begin = (before, float((position[0] - before) / self.step[first]))
+        load = self.load[first:last] if self.load.shape[0] > 1 else self.load
+        temperature = self.temperature[first:last] if self.temperature.shape[0] > 1 else self.temperature
+        return Run(self.step[first:last], self.effort[first:last], position, begin, load, temperature, self.noise)
+
+    def moved(self, effort: Array, position: Array) -> Run:
+        """The same with ``effort`` [F] and ``position`` [x] added to the signals, shape ``(n,)`` each."""
+        return replace(self, effort=self.effort + effort, position=self.position + position)
+
+
+def runs_of(record: Record) -> list[Run]:
+    """The valid contiguous parts of ``record`` that are long enough to learn from."""
+    load, temperature = surroundings(record)
+    bounds = np.flatnonzero(np.diff(np.concatenate([[False], record.mask, [False]]).astype(np.int8)))
+    found = []
+    for first, last in zip(bounds[::2].tolist(), bounds[1::2].tolist(), strict=True):
+        if last - first < 10 * SETTLING:
+            continue
+        position = record.position[first:last]
+        step = np.diff(record.time[first:last])
+        found.append(
+            Run(
+                step=step,
+                effort=np.ascontiguousarray(intervals(record.effort[first:last], record.effort_hold)),
+                position=np.ascontiguousarray(position[1:]),
+                start=(float(position[0]), float((position[1] - position[0]) / step[0])),
+                load=load[first : last - 1] if load.shape[0] > 1 else load,
+                temperature=temperature[first : last - 1] if temperature.shape[0] > 1 else temperature,
+                noise=noise_of(position),
+            )
+        )
+    return found
+
+
+def excerpt(runs: Sequence[Run], most: int) -> list[Run]:
+    """About ``most`` intervals: the beginning, the middle and the end of each run."""
+    share = min(1.0, most / sum(run.effort.shape[0] for run in runs))
+    parts = []
+    for run in runs:
+        n = run.effort.shape[0]
+        length = int(share * n / 3)
+        if length < 10 * SETTLING:
+            parts.append(run)
+            continue
+        parts += [run.part(first, first + length) for first in (0, (n - length) // 2, n - length)]
+    return parts
+
+
+def innovations(model: Model, runs: Sequence[Run], index: float, n_substeps: int) -> Array:
+    """Measured minus predicted position [x] at each sample of each run but its first ones.
+
+    Args:
+        model: that predicts.
+        runs: what was measured.
+        index: tracking index.
+        n_substeps: steps of the model from one sample to the next.
+    """
+    loops, values = model.loops, model.values
+    plant_values = np.array(model.plant_values)
+    alpha, beta = _gains(index)
+    parts = []
+    for run in runs:
+        state = np.ascontiguousarray(model.plant.start(plant_values, *run.start), dtype=np.float64)
+        found = np.empty(run.effort.shape[0])
+        loops.observe(
+            values, run.effort, run.position, run.step, n_substeps, run.load, run.temperature, alpha, beta, run.noise,
+            state, *model.inner_states(), found,
+        )  # fmt: skip
+        parts.append(found[SETTLING:])
+    # A model that escapes must cost much, not break the solver.
+    return np.asarray(np.nan_to_num(np.concatenate(parts), nan=1e3, posinf=1e3, neginf=-1e3), dtype=np.float64)
+
+
+def _gains(index: float) -> tuple[float, float]:
+    """Alpha and beta for a tracking index."""
+    r = (4.0 + index - math.sqrt(8.0 * index + index * index)) / 4.0
+    alpha = 1.0 - r * r
+    return alpha, 2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha)
+
+
+def noise_of(signal: Array) -> float:
+    """Standard deviation of the white noise of a signal, from high differences, which no smooth motion survives."""
+    gain = math.sqrt(float(comb(2 * _DIFFERENCES, _DIFFERENCES)))
+    return float(np.median(np.abs(np.diff(signal, _DIFFERENCES)))) / (0.6745 * gain)
