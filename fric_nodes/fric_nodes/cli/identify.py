@@ -27,6 +27,7 @@ from .options import (
 
 if TYPE_CHECKING:
     from ..identification.result import Identification, Options, Score
+    from ..identification.uncertainty import Uncertainty
     from ..model import Model
     from ..record import Record
 
@@ -55,7 +56,8 @@ def identify(
         str, typer.Option("--terms", help="Effects to fit when no model file is given, separated by commas.")
     ] = _DEFAULT_TERMS,
     method: Annotated[
-        str, typer.Option("--method", help="inverse-dynamics, or output-error (which starts from it).")
+        str,
+        typer.Option("--method", help="How to fit; 'fric model methods' lists them all, with the experiment that each needs."),
     ] = "inverse-dynamics",
     joint: JointOption = None,
     cutoff: Annotated[
@@ -75,6 +77,16 @@ def identify(
     horizon: Annotated[
         float | None, typer.Option("--horizon", help="Length of the free runs of output-error [s]; the whole recording.")
     ] = None,
+    gain: Annotated[
+        list[str] | None,
+        typer.Option("--gain", help="P,D of the feedback of a recorded oscillation; once for each recording, in their order."),
+    ] = None,
+    uncertainty: Annotated[
+        str,
+        typer.Option(
+            "--uncertainty", help="Intervals by sandwich (standard errors), bootstrap, or profile; empty: errors only."
+        ),
+    ] = "",
     repair: RepairOption = False,
     time: TimeOption = "stamp",
     start: StartOption = None,
@@ -87,7 +99,9 @@ def identify(
     from ..identification.result import Options
 
     _check(cutoff, decimation, rest_velocity, horizon)
-    options = Options(cutoff, decimation, rest_velocity, tuple(hold or ()), tuple(free or ()), robust, horizon)
+    options = Options(
+        cutoff, decimation, rest_velocity, tuple(hold or ()), tuple(free or ()), robust, horizon, _gains(gain or [], len(train))
+    )
     reading = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
     kept_apart = validate or []
     _refuse_overlap(train, kept_apart)
@@ -101,11 +115,19 @@ def identify(
     progress(f"fitting {', '.join(structure.names)} by {method}")
     result = _fit(method, structure, records, validation, options)
     summary = _summary(result)
+    if uncertainty:
+        from ..identification.uncertainty import assess
+
+        progress(f"finding intervals by {uncertainty}")
+        found = assess(result, records, options, uncertainty)
+        summary["uncertainty"] = _uncertainty_json(found)
     _write(out, result, records, validation, options, summary)
     if as_json:
         typer.echo(json.dumps(summary))
     else:
         _print(result, out)
+        if uncertainty:
+            _print_intervals(found, structure)
 
 
 def _check(cutoff: float | None, decimation: int | None, rest_velocity: float | None, horizon: float | None) -> None:
@@ -114,6 +136,22 @@ def _check(cutoff: float | None, decimation: int | None, rest_velocity: float | 
         lowest = 0.0 if name == "--rest-velocity" else 1e-12
         if value is not None and not (math.isfinite(value) and value >= lowest):
             raise InputError(name, f"is {value}", "give a positive number")
+
+
+def _gains(given: list[str], n_recordings: int) -> tuple[tuple[float, float], ...]:
+    """P and D of each recording, from texts such as ``0.6,0.01``."""
+    found = []
+    for text in given:
+        try:
+            p, d = (float(part) for part in text.split(","))
+        except ValueError:
+            raise InputError("--gain", f"is '{text}'", "give two numbers, such as 0.6,0.01") from None
+        if not (math.isfinite(p) and math.isfinite(d)):
+            raise InputError("--gain", f"is '{text}'", "give two finite numbers, such as 0.6,0.01")
+        found.append((p, d))
+    if found and len(found) != n_recordings:
+        raise InputError("--gain", f"is given {len(found)} times for {n_recordings} recordings", "give it once for each")
+    return tuple(found)
 
 
 def _refuse_overlap(train: list[Path], validation: list[Path]) -> None:
@@ -148,12 +186,14 @@ def _fit(method: str, structure: Model, records: list[Record], validation: list[
     result = replace(result, model=replace(result.model, provenance=provenance))
     if validation:
         notes = tuple(f"validation, {record.source}: {note}" for record in validation for note in record.notes)
+        notes += result.remarks_on(validation)
         result = replace(result, validation=score(result.model, validation, options), notes=(*result.notes, *notes))
     return result
 
 
-def _score_json(score: Score | None) -> dict[str, float] | None:
-    return None if score is None else asdict(score)
+def _score_json(score: Score | None) -> dict[str, float | None] | None:
+    """A score; what a method has no figure for is null."""
+    return None if score is None else {name: value if math.isfinite(value) else None for name, value in asdict(score).items()}
 
 
 def _summary(result: Identification) -> dict[str, Any]:
@@ -189,15 +229,67 @@ def _write(
     options: Options,
     summary: dict[str, Any],
 ) -> None:
-    """All three results, or none: they are made before the first is written."""
+    """Every result, or none: all are made before the first is written."""
     from ..files import write_text
+    from ..identification.static_maps.result import StaticMap
     from ..model_file import write_model
     from ..report.identification import identification_report
+    from ..report.static_map import static_map_report
 
-    page = identification_report(result, records, validation, options)
+    attachments = result.attachments
+    if isinstance(result, StaticMap):
+        page = static_map_report(result)
+    else:
+        page = identification_report(result, records, validation, options)
     write_text(out / "identification.json", json.dumps(summary, indent=2) + "\n")
     write_model(result.model, out / "model.yaml")
+    for name, text in attachments.items():
+        write_text(out / name, text)
     write_text(out / "report.html", page)
+
+
+def _uncertainty_json(found: Uncertainty) -> dict[str, Any]:
+    """Intervals by parameter; null where there is no limit, or no second recording."""
+
+    def number(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return {
+        "kind": found.kind,
+        "probability": found.probability,
+        "parameters": {
+            name: {
+                "std": number(float(found.standard_errors[k])),
+                "lower": number(float(found.lower[k])),
+                "upper": number(float(found.upper[k])),
+                "std_over_restarts": number(float(found.restarts[k])),
+                "std_over_recordings": number(float(found.recordings[k])),
+            }
+            for k, name in enumerate(found.names)
+        },
+        "notes": list(found.notes),
+    }
+
+
+def _print_intervals(found: Uncertainty, model: Model) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    shown = Table(
+        box=None, pad_edge=False, title=f"{found.kind}: {100 * found.probability:g} % intervals", title_justify="left"
+    )
+    shown.add_column("parameter")
+    for column in ("from", "to", "std over restarts", "over recordings"):
+        shown.add_column(column, justify="right")
+    shown.add_column("unit")
+    for k, name in enumerate(found.names):
+        numbers = (found.lower[k], found.upper[k], found.restarts[k], found.recordings[k])
+        texts = [f"{value:.5g}" if math.isfinite(value) else "-" for value in numbers]
+        shown.add_row(name, *texts, model.unit(name))
+    console = Console()
+    console.print(shown)
+    for line in found.notes:
+        console.print(f"- {line}", highlight=False, markup=False)
 
 
 def _print(result: Identification, out: Path) -> None:
@@ -218,12 +310,15 @@ def _print(result: Identification, out: Path) -> None:
     units = result.model.units
     for name, score in (("train", result.train), ("validation", result.validation)):
         if score is not None:
-            console.print(
-                f"{name}: relative force error {score.relative_force_error_percent:.2f} %, NOE {score.noe:.4f} %, "
-                f"free-run position RMSE {score.position_rmse:.3g} {units.position}",
-                highlight=False,
+            run = (
+                f", free-run position RMSE {score.position_rmse:.3g} {units.position}"
+                if math.isfinite(score.position_rmse)
+                else ""
             )
+            force = f"relative force error {score.relative_force_error_percent:.2f} %, NOE {score.noe:.4f} %"
+            console.print(f"{name}: {force}{run}", highlight=False)
     for line in (*result.notes, *result.warnings):
         console.print(f"- {line}", highlight=False, markup=False)
     console.print(f"status: {result.status}", highlight=False, markup=False)
-    console.print(f"written: {out / 'model.yaml'}, identification.json, report.html", highlight=False, markup=False)
+    written = ", ".join([str(out / "model.yaml"), *result.attachments, "identification.json", "report.html"])
+    console.print(f"written: {written}", highlight=False, markup=False)
