@@ -37,6 +37,7 @@ class Graph:
         self._executors: list[tuple[Executor, threading.Thread]] = []
         self._processes: list[subprocess.Popen[str]] = []
         self._nodes: list[Node] = []
+        self._closing = False
 
     def context(self, *args: str) -> Context:
         """A context of its own, initialised with ROS arguments such as ``-r a:=b``."""
@@ -61,8 +62,13 @@ class Graph:
             executor.add_node(node)
 
         def work() -> None:
-            with contextlib.suppress(ExternalShutdownException):
-                executor.spin()
+            try:
+                with contextlib.suppress(ExternalShutdownException):
+                    executor.spin()
+            except AttributeError:
+                # rclpy's shutdown may take the guards away while the last wait is being set up.
+                if not self._closing:
+                    raise
 
         thread = threading.Thread(target=work, name=f"spin-{nodes[0].get_name()}")
         thread.start()
@@ -99,6 +105,7 @@ class Graph:
 
     def close(self) -> None:
         """End everything, in an order in which nothing is used after it is gone."""
+        self._closing = True
         for process in self._processes:
             if process.poll() is None:
                 process.kill()
