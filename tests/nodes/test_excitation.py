@@ -116,6 +116,8 @@ def test_in_wall_time_an_axis_oscillates(graph: Graph) -> None:
     node.create_subscription(JointState, "joint_states", lambda m: positions.append(m.position[0]), DEEP)
     graph.spin(node, kind=LeanExecutor)
     values = {key: f"[{','.join(value)}]" if isinstance(value, list) else value for key, value in _parameters().items()}
+    # Long enough for many more crossings than are asked for, whatever the machine does meanwhile.
+    values["parametric_oscillation.oscillation_time"] = 2.0
     running = [
         graph.start_node("excitation", period=0.005, **values),
         graph.start_node("plant", period=0.005, model_file=_write(graph.folder)),

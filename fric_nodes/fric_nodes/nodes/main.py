@@ -37,6 +37,13 @@ def run(make: Callable[[], LoopNode], args: list[str] | None = None) -> None:
             executor.spin_until_future_complete(node.finished)
         except (KeyboardInterrupt, ExternalShutdownException):
             _let_the_signal_pass()
+        except InputError:
+            raise
+        except Exception:
+            # While the node is being made a signal may also show as a compilation broken off or a publisher refused.
+            _let_the_signal_pass(0.2)
+            if rclpy.ok():
+                raise
         finally:
             executor.shutdown()
             if node is not None:
@@ -53,9 +60,9 @@ def run(make: Callable[[], LoopNode], args: list[str] | None = None) -> None:
         sys.exit(2)
 
 
-def _let_the_signal_pass() -> None:
+def _let_the_signal_pass(limit: float = 0.5) -> None:
     """Wait until the middleware has dealt with the signal: its own thread still wakes what is about to be destroyed."""
-    deadline = time.monotonic() + 0.5
+    deadline = time.monotonic() + limit
     while rclpy.ok() and time.monotonic() < deadline:
         time.sleep(0.002)
     time.sleep(0.01)
