@@ -151,3 +151,14 @@ def test_losses_are_the_gaps_in_the_publishers_numbers() -> None:
     state.count(7, one_publisher=False)
     state.count(None, one_publisher=True)
     assert (state.received, state.lost) == (8, 3)
+
+
+def test_the_first_message_of_one_topic_waits_for_that_of_another() -> None:
+    order = StampOrder([topic("a"), topic("b"), topic("never")])
+    order.add(1, stamped(0), 1000 * MS)
+    assert order.release(1005 * MS) == []
+    order.add(0, stamped(0), 1006 * MS)
+    assert order.release(1010 * MS) == []  # the third may still be on its way
+    order.add(1, stamped(MS), 1190 * MS)
+    order.add(0, stamped(MS), 1195 * MS)
+    assert [message[1] for message in order.release(1201 * MS)] == [0, 1, 0, 1]

@@ -22,6 +22,7 @@ __all__ = ["Message", "ReceiveOrder", "StampOrder", "TopicIntake", "header_stamp
 _STAMP = {0: struct.Struct(">iI"), 1: struct.Struct("<iI")}
 _REMEMBERED = 64  # payloads kept per topic to recognise a retransmission; lock-step runs ahead by far less
 _SILENT_AFTER = 200_000_000  # [ns] a topic that says nothing for so long doesn't hold up the others
+_HELD_AT_FIRST = 200_000_000  # [ns] from the first message on, for topics that have not said anything yet
 _RESTART = 1_000_000  # [ns] between the last log time and the first one after a restart of the stamps
 
 Message = tuple[int, int, bytes]
@@ -132,6 +133,7 @@ class StampOrder:
         self._newest = (0, 0)
         self._base = {0: 0}
         self._last_log_time = 0
+        self._begun: int | None = None  # when the first message with a clock was received
 
     def add(self, index: int, payload: bytes, received: int) -> None:
         """Take in a message of topic ``index`` that was received at ``received`` [ns]."""
@@ -147,6 +149,8 @@ class StampOrder:
                 topic.restarts += 1
                 self._on_restart(topic.name)
             topic.last_stamp, topic.last_received = stamp, received
+            if self._begun is None:
+                self._begun = received
             key = (topic.restarts, stamp)
             self._newest = max(self._newest, key)
         elif topic.stamped and topic.is_repetition(payload, -1):
@@ -171,6 +175,12 @@ class StampOrder:
             # Nobody talks: either the loop stands still, and little waits here, or no topic has a clock at all.
             clockless = not any(t.follows_clock and t.last_stamp >= 0 for t in self._topics)
             return len(self._waiting) if clockless else 0
+        if (
+            self._begun is not None
+            and now - self._begun < _HELD_AT_FIRST
+            and any(t.follows_clock and t.last_stamp < 0 for t in self._topics)
+        ):
+            return 0  # the first message of another topic may be on its way
         reached = min((t.restarts, t.last_stamp) for t in talking)
         return next((at for at, message in enumerate(self._waiting) if message[:2] > reached), len(self._waiting))
 
