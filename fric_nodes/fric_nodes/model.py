@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .compile import Loops, loops_for
 from .effect import Effect, Place
 from .effects import EFFECTS, by_name
+from .engine.compile import Loops, loops_for
 from .errors import InputError
 from .parameter import Parameter
 from .plant import Plant

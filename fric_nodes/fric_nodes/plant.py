@@ -10,8 +10,9 @@ A plant lives in a file of its own in ``plants/`` and offers three compiled func
 ``drive(p, q, v, a) -> float``
     the force that the motion needs without any term of the model [F].
 
-They use the model's terms under the names of :mod:`fric_nodes.assembled`; ``p`` holds all values, the plant's own first. The
-body at the contact is led by :mod:`fric_nodes.contact`, whatever else moves around it. Of modules only ``math`` is at hand.
+They use the model's terms under the names of :mod:`fric_nodes.engine.assembled`; ``p`` holds all values, the plant's own first.
+The body at the contact is led by :mod:`fric_nodes.engine.contact`, whatever else moves around it. Of modules only ``math`` is
+at hand.
 """
 
 from __future__ import annotations

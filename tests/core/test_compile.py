@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from fric_nodes.compile import loops_for
+from fric_nodes.engine.compile import loops_for
 from fric_nodes.model import Model, build_model, term
 
 SCRIPT = """

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fric_nodes.effect import Effect, Place
 from fric_nodes.effects import EFFECTS
-from fric_nodes.kernel import kernel
+from fric_nodes.engine.kernel import kernel
 from fric_nodes.model import Term, build_model, term
 from fric_nodes.verification import elasto_plastic_drift, passivity, presliding_memory, stick_slip
 

@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parent / "laws_c"
 """Where the C texts are."""
 
 CLoop = Callable[..., None]
-"""``(p, u, h, load, temperature, x, z, x_out, friction_out, applied_out)``, as :func:`fric_nodes.loops.simulate` has them."""
+"""``(p, u, h, load, temperature, x, z, x_out, friction_out, applied_out)``; see :func:`fric_nodes.engine.loops.simulate`."""
 
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 

@@ -10,7 +10,7 @@ printed.
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]

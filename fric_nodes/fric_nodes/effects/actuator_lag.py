@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from ..effect import Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..steps.first_order import mean_decay
 

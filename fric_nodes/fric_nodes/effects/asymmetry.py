@@ -9,7 +9,7 @@ Source: de Marchi 1998 (asymmetric kinetic and viscous friction, mean and half d
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]

@@ -2,8 +2,8 @@
 
 Equation: within the play |y - q| < b/2 nothing is passed on; at its end the sides meet in a fully plastic impact, which keeps
 their momentum, and go on together with the velocity (m_m v_m + m_l v_l)/(m_m + m_l) until the motor draws back. The impact is
-exact (:mod:`fric_nodes.transmission`): nothing rebounds, and what it takes of the energy is half the reduced mass times the
-square of the closing speed.
+exact (:mod:`fric_nodes.engine.transmission`): nothing rebounds, and what it takes of the energy is half the reduced mass times
+the square of the closing speed.
 
 In a model that has a ``compliance`` or an ``impact_backlash`` besides, the play is added to theirs, and their spring is what
 it ends at.
@@ -14,7 +14,7 @@ conserved").
 from __future__ import annotations
 
 from ..effect import Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]

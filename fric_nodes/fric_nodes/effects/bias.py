@@ -7,7 +7,7 @@ Source: the offset of every published axis model, such as EMPS (Janot, Gautier, 
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]

@@ -7,7 +7,7 @@ Source: C. A. Coulomb, 1785; Szell, Eq. 6.
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..effect import Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..steps import delay_line
 from ..steps.delay_line import begin, mean_before, put

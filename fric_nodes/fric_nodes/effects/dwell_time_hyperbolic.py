@@ -10,7 +10,7 @@ from F_0 upwards it does. (So does F_inf - (F_inf - F_0) C_1/(t + C_1), which is
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 

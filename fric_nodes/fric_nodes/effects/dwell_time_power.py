@@ -9,7 +9,7 @@ kinetic friction: the surplus over it is the law itself. C_1 is S_1 over 1 s to 
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 

@@ -12,7 +12,7 @@ starts as if the contact had always been as it is in its first step.
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..steps import delay_line
 from ..steps.delay_line import put, value_before

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from ..effect import Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..steps.elastic import pushing
 

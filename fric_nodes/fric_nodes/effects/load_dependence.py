@@ -8,7 +8,7 @@ Source: Coulomb 1785; Szell, Eq. 7; Al-Zughaibi 2018, Coulomb friction by the no
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]

@@ -10,7 +10,7 @@ Source: Amontons, Coulomb; Al-Zughaibi 2018, Eqs. 20 and 34, with |F_nb| sgn(v),
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from ..effect import Effect, Place
+from ..engine.kernel import kernel
 from ..friction.asperity_loops import advance, heights, start
-from ..kernel import kernel
 from ..parameter import Parameter
 from ..record import Array
 

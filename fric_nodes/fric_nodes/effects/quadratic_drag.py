@@ -7,7 +7,7 @@ Source: Newton's drag law; standard in friction models of fast drives and vehicl
 from __future__ import annotations
 
 from ..effect import Context, Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]

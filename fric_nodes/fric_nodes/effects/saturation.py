@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..effect import Effect, Place
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]

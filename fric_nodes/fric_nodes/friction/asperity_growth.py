@@ -32,7 +32,7 @@ from __future__ import annotations
 
 import math
 
-from ..kernel import kernel
+from ..engine.kernel import kernel
 
 __all__ = ["GROWTH_LAWS", "aged", "fresh", "growth_rate", "impulse", "strength"]
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel import kernel, loop
+from ..engine.kernel import kernel, loop
 from .asperity_growth import aged, fresh, growth_rate, impulse, strength
 
 __all__ = ["advance", "heights", "run", "run_under_load", "start", "uniform"]

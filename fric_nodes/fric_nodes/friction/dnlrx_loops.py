@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..kernel import kernel
+from ..engine.kernel import kernel
 
 __all__ = ["deform", "predict", "simulate"]
 

@@ -3,8 +3,8 @@
 Equation: m dv/dt = u - F, with F between the nodes of a table linear in v. Below the first node F keeps that node's value, so
 that there is a level to stick at; beyond the last it stays in proportion to v, as a constant damping would.
 
-The step is that of :mod:`fric_nodes.contact` (implicit midpoint, exact stops, exact sticking, and where neither branch can hold
-the velocity stays what it is), for a law that is no term of a model.
+The step is that of :mod:`fric_nodes.engine.contact` (implicit midpoint, exact stops, exact sticking, and where neither branch
+can hold the velocity stays what it is), for a law that is no term of a model.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..kernel import kernel, loop
+from ..engine.kernel import kernel, loop
 from ..record import Array
 from ..simulate import Motion, intervals
 

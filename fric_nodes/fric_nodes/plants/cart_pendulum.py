@@ -11,10 +11,10 @@ J_t dw/dt = m g l sin a - c w, by one classic Runge-Kutta step. The cart's whole
     (M + m - (m l cos a)^2/J_t) dv/dt = u - F - F_contact + m l w^2 sin a - (m l cos a/J_t) (m g l sin a - c w),
     dw = -(m l cos a/J_t) dv    (beside what the pole's half steps do),
 
-which is one body of the mass in brackets under a force that depends on v through w: :mod:`fric_nodes.contact` leads it, exact
-in its sticking, with w = w_0 - (m l cos a/J_t)(v - v_0) at the mean velocity. Half a step of the pole. While the cart sticks,
-the pole swings about a fixed pivot, and its reaction is what friction has to hold.
-Energy isn't kept exactly, but oscillates within the square of the step without drifting off.
+which is one body of the mass in brackets under a force that depends on v through w: :mod:`fric_nodes.engine.contact` leads it,
+exact in its sticking, with w = w_0 - (m l cos a/J_t)(v - v_0) at the mean velocity. Half a step of the pole. While the cart
+sticks, the pole swings about a fixed pivot, and its reaction is what friction has to hold. Energy isn't kept exactly, but
+oscillates within the square of the step without drifting off.
 
 The force that a motion of the cart needs is given for a pole that doesn't swing, since its angle isn't part of a recorded axis;
 a fit holds the pole's parameters.
@@ -28,10 +28,10 @@ from typing import Any
 
 import numpy as np
 
-from ..assembled import Inner, Surroundings
-from ..contact import CONTACT_FUNCTIONS, contact_step
 from ..effect import Context
-from ..kernel import kernel
+from ..engine.assembled import Inner, Surroundings
+from ..engine.contact import CONTACT_FUNCTIONS, contact_step
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..plant import Plant, Signal
 from ..record import Array

@@ -18,7 +18,7 @@ angle, N m/rad (printed N m s^2). The table's k_i and c_i belong to the measured
 all four data sets, and c_i = 2 J zeta w_0, Dc_i likewise (Dzeta of data set 2 is then 0.0036, as estimated, and not 0.0086);
 the 5.58e-4 N m s stated for the inertia is about a twentieth of that.
 
-Step: :mod:`fric_nodes.contact`, with the mean torque of spring and weight along the step, for the weight
+Step: :mod:`fric_nodes.engine.contact`, with the mean torque of spring and weight along the step, for the weight
 G (cos q_0 - cos q_1)/(q_1 - q_0), so that neither gains or loses energy, whatever the step.
 Source: de Marchi 1998, parametric harmonic oscillation and asymmetric friction identification.
 """
@@ -30,10 +30,10 @@ from typing import Any
 
 import numpy as np
 
-from ..assembled import Inner, Surroundings
-from ..contact import CONTACT_FUNCTIONS, contact_step
 from ..effect import Context
-from ..kernel import kernel
+from ..engine.assembled import Inner, Surroundings
+from ..engine.contact import CONTACT_FUNCTIONS, contact_step
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..plant import Plant
 from ..record import Array

@@ -31,9 +31,10 @@ v_1 = 0.05/999 m/s, the innermost of 1000 velocities, give 0.1020 and 0.1021 kg)
 293 K; supply 7 bar and exhaust 1.013 bar absolute; alpha A_v = 1.6 mm^2, of a valve for 100 l/min; overlaps 2 % and 0.
 
 Step: Strang splitting. Half a step of the pressures, the piston gliding on at its velocity; the piston's whole step under the
-force that they then give, exact in its sticking (:mod:`fric_nodes.contact`); half a step of the pressures. The half steps are
-split into as many classic Runge-Kutta steps as the flow at small pressure differences needs.
-Source: Szell, Eqs. 12-22; psi as in any textbook of pneumatics, e.g. Beater, Pneumatic Drives, 2007.
+force that they then give, exact in its sticking (:mod:`fric_nodes.engine.contact`); half a step of the pressures. The half
+steps are split into as many classic Runge-Kutta steps as the flow at small pressure differences needs.
+Source: Szell, Eqs.
+12-22; psi as in any textbook of pneumatics, e.g. Beater, Pneumatic Drives, 2007.
 """
 
 from __future__ import annotations
@@ -43,10 +44,10 @@ from typing import Any
 
 import numpy as np
 
-from ..assembled import Inner, Surroundings
-from ..contact import CONTACT_FUNCTIONS, contact_step
 from ..effect import Context
-from ..kernel import kernel
+from ..engine.assembled import Inner, Surroundings
+from ..engine.contact import CONTACT_FUNCTIONS, contact_step
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..plant import Plant, Signal
 from ..record import Array

@@ -29,10 +29,11 @@ enough for the cylinder to follow the filtered step and fast enough to excite th
 -0.03 to 0.16 m to which the simulator's software limits X_rd, so that no command empties a chamber.
 
 Step: Strang splitting. Half a step of everything but the body, which glides on at its velocity; the body's whole step with
-wheel and wheel speed as they are then, exact in its sticking (:mod:`fric_nodes.contact`; what the suspension force owes to the
-body's own motion is the plant's own force there); half a step of the rest. The oil on the tyre's small mass oscillates at about
-700 Hz, so the half steps are split into as many classic Runge-Kutta steps as it needs.
-Source: A. I. H. Al-Zughaibi, Nonlinear Dynamics 2018, Eqs. 1-12, 27-34 and the list of symbols.
+wheel and wheel speed as they are then, exact in its sticking (:mod:`fric_nodes.engine.contact`; what the suspension force owes
+to the body's own motion is the plant's own force there); half a step of the rest. The oil on the tyre's small mass oscillates
+at about 700 Hz, so the half steps are split into as many classic Runge-Kutta steps as it needs.
+Source: A. I. H. Al-Zughaibi,
+Nonlinear Dynamics 2018, Eqs. 1-12, 27-34 and the list of symbols.
 """
 
 from __future__ import annotations
@@ -42,10 +43,10 @@ from typing import Any
 
 import numpy as np
 
-from ..assembled import Inner, Surroundings, force, level
-from ..contact import CONTACT_FUNCTIONS, contact_step
 from ..effect import Context
-from ..kernel import kernel
+from ..engine.assembled import Inner, Surroundings, force, level
+from ..engine.contact import CONTACT_FUNCTIONS, contact_step
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..plant import Plant, Signal
 from ..record import Array

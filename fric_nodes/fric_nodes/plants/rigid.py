@@ -1,17 +1,17 @@
 """Rigid axis: one body, one contact.
 
-Equation: m dv/dt = u - F(q, v, t) - F_contact, stepped by :mod:`fric_nodes.contact`. With backlash or compliance among the
-terms the axis becomes two bodies, see :mod:`fric_nodes.plants.rigid_driven`.
+Equation: m dv/dt = u - F(q, v, t) - F_contact, stepped by :mod:`fric_nodes.engine.contact`. With backlash or compliance among
+the terms the axis becomes two bodies, see :mod:`fric_nodes.plants.rigid_driven`.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from ..assembled import Inner, Surroundings
-from ..contact import CONTACT_FUNCTIONS, contact_step
 from ..effect import Context
-from ..kernel import kernel
+from ..engine.assembled import Inner, Surroundings
+from ..engine.contact import CONTACT_FUNCTIONS, contact_step
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..plant import Plant
 from .rigid_driven import DRIVEN
@@ -42,7 +42,7 @@ PLANT = Plant(
     id="rigid",
     title="rigid axis",
     equation="m dv/dt = u - F(q, v, t) - F_contact",
-    source="Newton; implicit midpoint rule with exact stops, derived in fric_nodes.contact",
+    source="Newton; implicit midpoint rule with exact stops, derived in fric_nodes.engine.contact",
     parameters=(
         Parameter("mass", "m", "F s^2/x", "moving mass, or moment of inertia of a rotary axis", positive=True, linear=True),
     ),

@@ -1,9 +1,9 @@
 """Rigid axis behind a transmission: its mass in two parts, of which the sensor sees the motor's.
 
 Equation: m_m d^2y/dt^2 = u - L, m_l d^2q/dt^2 = L - F(q, v, t) - F_contact, with m_l = s m, m_m = (1 - s) m, and L the force of
-the model's transmission terms over y - q; stepped by :mod:`fric_nodes.transmission`. It takes the rigid axis's place as soon as
-a model of it gets backlash or compliance, so that a model can grow by them; the share s of the mass that lies behind the
-transmission is held at its value unless a fit is asked to free it.
+the model's transmission terms over y - q; stepped by :mod:`fric_nodes.engine.transmission`. It takes the rigid axis's place as
+soon as a model of it gets backlash or compliance, so that a model can grow by them; the share s of the mass that lies behind
+the transmission is held at its value unless a fit is asked to free it.
 Source: Newton; the two-mass model of a drive.
 """
 
@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from ..assembled import Inner, Surroundings
-from ..kernel import kernel
+from ..engine.assembled import Inner, Surroundings
+from ..engine.kernel import kernel
+from ..engine.transmission import TRANSMISSION_FUNCTIONS, driven_step
 from ..parameter import Parameter
 from ..plant import Plant, Signal
 from ..record import Array
-from ..transmission import TRANSMISSION_FUNCTIONS, driven_step
 
 __all__ = ["DRIVEN"]
 
@@ -51,7 +51,7 @@ DRIVEN = Plant(
     id="rigid",
     title="rigid axis behind a transmission",
     equation="m_m d^2y/dt^2 = u - L, m_l dv/dt = L - F(q, v, t) - F_contact",
-    source="Newton; the two-mass model of a drive, stepped as derived in fric_nodes.transmission",
+    source="Newton; the two-mass model of a drive, stepped as derived in fric_nodes.engine.transmission",
     parameters=(
         Parameter("mass", "m", "F s^2/x", "moving mass, or moment of inertia of a rotary axis", positive=True, linear=True),
         Parameter(

@@ -6,10 +6,11 @@ Equations, with q the load's position and y the motor's:
 
 L is the force of the model's transmission terms (``backlash``, ``impact_backlash``, ``compliance``) over y - q; without any,
 both are rigidly coupled. The friction of the terms is the load's, F_m and c_m are the motor's own. The command acts on the
-motor, and the sensor sees the motor; the load's position is measured besides. Stepped by :mod:`fric_nodes.transmission`. A
-fit from force and motion sees the sum of the masses only, so it holds the load's unless it is asked to free it.
-Source: de Marchi 1998, mechanical positioning test bed (Walczyk and Craig 1991) with adjustable friction, backlash and
-compliance; the equations are those of the usual two-mass model.
+motor, and the sensor sees the motor; the load's position is measured besides. Stepped by :mod:`fric_nodes.engine.transmission`.
+A fit from force and motion sees the sum of the masses only, so it holds the load's unless it is asked to free it.
+Source: de
+Marchi 1998, mechanical positioning test bed (Walczyk and Craig 1991) with adjustable friction, backlash and compliance; the
+equations are those of the usual two-mass model.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from ..assembled import Inner, Surroundings
-from ..kernel import kernel
+from ..engine.assembled import Inner, Surroundings
+from ..engine.kernel import kernel
+from ..engine.transmission import TRANSMISSION_FUNCTIONS, driven_step
 from ..parameter import Parameter
 from ..plant import Plant, Signal
 from ..record import Array
-from ..transmission import TRANSMISSION_FUNCTIONS, driven_step
 
 __all__ = ["PLANT"]
 
@@ -63,7 +64,7 @@ _TEST_BED = Plant(
     id="two_mass",
     title="two-mass test bed",
     equation="m_m d^2y/dt^2 = u - L - c_m dy/dt - F_m sgn(dy/dt), m_l dv/dt = L - F(q, v, t) - F_contact",
-    source="de Marchi 1998, mechanical positioning test bed; stepped as derived in fric_nodes.transmission",
+    source="de Marchi 1998, mechanical positioning test bed; stepped as derived in fric_nodes.engine.transmission",
     parameters=(
         Parameter("motor_mass", "m_m", "F s^2/x", "mass or moment of inertia of the motor", positive=True, linear=True),
         Parameter(

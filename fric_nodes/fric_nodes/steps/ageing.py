@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from ..effect import Context
-from ..kernel import kernel
+from ..engine.kernel import kernel
 from ..parameter import Parameter
 from .first_order import mean_decay
 

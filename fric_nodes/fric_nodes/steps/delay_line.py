@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..kernel import kernel
+from ..engine.kernel import kernel
 
 __all__ = ["N_STATES", "begin", "mean_before", "put", "value_before"]
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from ..kernel import kernel
+from ..engine.kernel import kernel
 
 __all__ = ["bonded", "parting", "pushing", "stops"]
 

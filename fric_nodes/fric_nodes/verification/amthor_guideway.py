@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel import loop
+from ..engine.kernel import loop
 from ..record import Array, Record
 
 __all__ = ["SAMPLE_TIME", "graded_strokes", "recorded", "wandering"]

@@ -1,6 +1,6 @@
 /* One body with friction that is a function of what can be seen now, or of one memory, and exact stick: implicit midpoint rule, secant method.
  *
- * m dv/dt = u - F - side max(level, 0); the same equations, trials and tolerances as fric_nodes/contact.py, written by hand for
+ * m dv/dt = u - F - side max(level, 0); the same equations, trials and tolerances as fric_nodes/engine/contact.py, written by hand for
  * one law, which the compiler is told with -D.
  */
 #include <math.h>

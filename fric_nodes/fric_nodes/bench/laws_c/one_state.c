@@ -1,6 +1,6 @@
 /* One body on bristles with one state, with Coulomb, Stribeck and viscous friction: implicit midpoint rule, secant method.
  *
- * The same equations, trials and tolerances as fric_nodes/contact.py and effects/presliding_*.py, written by hand for one law,
+ * The same equations, trials and tolerances as fric_nodes/engine/contact.py and effects/presliding_*.py, written by hand for one law,
  * which the compiler is told with -D. p: mass, Coulomb force, Stribeck force, velocity and exponent, the law's own parameters,
  * viscous coefficient.
  */

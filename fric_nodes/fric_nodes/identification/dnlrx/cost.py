@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from ...kernel import kernel, loop
+from ...engine.kernel import kernel, loop
 from ...record import Array, Index
 from .samples import Samples
 

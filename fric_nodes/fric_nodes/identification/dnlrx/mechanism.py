@@ -22,7 +22,7 @@ import numpy as np
 from scipy import signal
 from scipy.optimize import least_squares, lsq_linear
 
-from ...kernel import loop
+from ...engine.kernel import loop
 from ...model import Model
 from ...record import Array, Index
 from ..free_parameters import FreeParameters

@@ -1,13 +1,14 @@
 """The compiled loops of every model: motion from force, force from motion, and motion followed sample by sample.
 
-They are written once, over the names of :mod:`fric_nodes.assembled`, and compiled for each structure by
-:mod:`fric_nodes.compile`, which also hands in the work space of a step, the last arguments.
+They are written once, over the names of :mod:`fric_nodes.engine.assembled`, and compiled for each structure by
+:mod:`fric_nodes.engine.compile`, which also hands in the work space of a step, the last arguments.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from ..effect import Context
 from .assembled import (
     MEMORY,
     N_STATES,
@@ -26,7 +27,6 @@ from .assembled import (
     step,
     unpacked,
 )
-from .effect import Context
 from .kernel import kernel, local_array
 
 __all__ = ["LOOPS", "advance", "observe", "predict", "respond", "simulate"]
@@ -165,4 +165,4 @@ def respond(p: Any, u: Any, h: float, n_sub: int, memory: Any, applied_out: Any)
 
 
 LOOPS = (simulate, predict, observe, respond)
-"""The loops, in the order of :class:`fric_nodes.compile.Loops`."""
+"""The loops, in the order of :class:`fric_nodes.engine.compile.Loops`."""

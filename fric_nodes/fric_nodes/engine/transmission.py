@@ -6,8 +6,8 @@ Equations, with q the load's position (the body at the contact), y the motor's, 
     m_l d^2q/dt^2 = L - F(q, dq/dt, t) - F_contact.
 
 Elastic transmission. L is constant over the step, its mean. Either body is led under it exactly as it would be alone, the load
-with all its terms and its exact sticking (:mod:`fric_nodes.contact`), the motor in closed form. L is found such that it is
-the mean force that the link gives for the deflections e_0 and e_1 that it leads to:
+with all its terms and its exact sticking (:mod:`fric_nodes.engine.contact`), the motor in closed form. L is found such that it
+is the mean force that the link gives for the deflections e_0 and e_1 that it leads to:
 
     L = link(e_0, e_1(L), h).
 
@@ -32,9 +32,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ..effect import Context
 from .assembled import RIGID, Inner, Surroundings, link, play
 from .contact import CONTACT_FUNCTIONS, contact_step, opposing, slide, solve
-from .effect import Context
 from .kernel import kernel
 
 __all__ = ["TRANSMISSION_FUNCTIONS", "driven_step"]

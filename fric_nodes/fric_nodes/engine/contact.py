@@ -31,8 +31,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ..effect import Context
 from .assembled import ACCELERATION, RIGID, Inner, Surroundings, force, level, own, slip
-from .effect import Context
 from .kernel import kernel
 
 __all__ = ["CONTACT_FUNCTIONS", "contact_step", "glide", "opposing", "slide", "solve"]

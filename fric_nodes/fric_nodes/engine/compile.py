@@ -32,11 +32,11 @@ from typing import Any, cast
 import numba
 import numpy as np
 
+from ..effect import Effect
+from ..plant import Plant
+from ..record import Array
 from . import loops
-from .effect import Effect
 from .kernel import kernel
-from .plant import Plant
-from .record import Array
 
 __all__ = ["Loops", "loops_for"]
 
@@ -44,15 +44,15 @@ __all__ = ["Loops", "loops_for"]
 _IMPORTS = (
     "import math",
     "from typing import Any",
-    "from fric_nodes.assembled import Inner, Surroundings",
+    "from fric_nodes.engine.assembled import Inner, Surroundings",
     "from fric_nodes.effect import Context",
-    "from fric_nodes.kernel import kernel, local_array, loop",
+    "from fric_nodes.engine.kernel import kernel, local_array, loop",
 )
 
 
 @dataclass(frozen=True)
 class Loops:
-    """Compiled loops of one model structure; arguments as in :mod:`fric_nodes.loops`, without the work space.
+    """Compiled loops of one model structure; arguments as in :mod:`fric_nodes.engine.loops`, without the work space.
 
     Attributes:
         simulate: motion from force.
@@ -113,7 +113,7 @@ def _with_work_space(loop: Callable[..., None], n_constants: Callable[[Array], i
 
 
 class _Assembly:
-    """The bodies of a model's functions, grown effect by effect; see :mod:`fric_nodes.assembled` for what each is."""
+    """The bodies of a model's functions, grown effect by effect; see :mod:`fric_nodes.engine.assembled` for what each is."""
 
     def __init__(self, at: int) -> None:
         self.imports: list[str] = list(_IMPORTS)

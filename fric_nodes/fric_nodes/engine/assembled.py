@@ -1,14 +1,14 @@
 """Stand-ins for a model's assembled terms, so that plants and loops can be written and type-checked against their names.
 
-:mod:`fric_nodes.compile` copies the functions that use these names into a module where they are the model's own. They are never
-called here.
+:mod:`fric_nodes.engine.compile` copies the functions that use these names into a module where they are the model's own. They
+are never called here.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from .effect import Context
+from ..effect import Context
 
 __all__ = [
     "ACCELERATION",
