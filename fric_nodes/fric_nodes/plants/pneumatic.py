@@ -33,8 +33,7 @@ v_1 = 0.05/999 m/s, the innermost of 1000 velocities, give 0.1020 and 0.1021 kg)
 Step: Strang splitting. Half a step of the pressures, the piston gliding on at its velocity; the piston's whole step under the
 force that they then give, exact in its sticking (:mod:`fric_nodes.engine.contact`); half a step of the pressures. The half
 steps are split into as many classic Runge-Kutta steps as the flow at small pressure differences needs.
-Source: Szell, Eqs.
-12-22; psi as in any textbook of pneumatics, e.g. Beater, Pneumatic Drives, 2007.
+Source: Szell, Eqs. 12-22; psi as in any textbook of pneumatics, e.g. Beater, Pneumatic Drives, 2007.
 """
 
 from __future__ import annotations

@@ -32,8 +32,7 @@ Step: Strang splitting. Half a step of everything but the body, which glides on 
 wheel and wheel speed as they are then, exact in its sticking (:mod:`fric_nodes.engine.contact`; what the suspension force owes
 to the body's own motion is the plant's own force there); half a step of the rest. The oil on the tyre's small mass oscillates
 at about 700 Hz, so the half steps are split into as many classic Runge-Kutta steps as it needs.
-Source: A. I. H. Al-Zughaibi,
-Nonlinear Dynamics 2018, Eqs. 1-12, 27-34 and the list of symbols.
+Source: A. I. H. Al-Zughaibi, Nonlinear Dynamics 2018, Eqs. 1-12, 27-34 and the list of symbols.
 """
 
 from __future__ import annotations

@@ -8,9 +8,8 @@ L is the force of the model's transmission terms (``backlash``, ``impact_backlas
 both are rigidly coupled. The friction of the terms is the load's, F_m and c_m are the motor's own. The command acts on the
 motor, and the sensor sees the motor; the load's position is measured besides. Stepped by :mod:`fric_nodes.engine.transmission`.
 A fit from force and motion sees the sum of the masses only, so it holds the load's unless it is asked to free it.
-Source: de
-Marchi 1998, mechanical positioning test bed (Walczyk and Craig 1991) with adjustable friction, backlash and compliance; the
-equations are those of the usual two-mass model.
+Source: de Marchi 1998, mechanical positioning test bed (Walczyk and Craig 1991) with adjustable friction, backlash and
+compliance; the equations are those of the usual two-mass model.
 """
 
 from __future__ import annotations
