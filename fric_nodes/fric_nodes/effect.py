@@ -122,6 +122,7 @@ class Effect:
         n_constants: number of constants, or a function of the values.
         uses_acceleration: True when it depends on the sign of the acceleration.
         rate: fastest rate [1/s] of the effect on a body of the given mass, from ``(mass, *values)``; sets the step. None: slow.
+        absent: values of nonlinear parameters at which the effect does nothing, however the others are.
         regime: where in a recording the effect shows.
         looks_like: other effects with a similar trace, each with the experiment that tells them apart.
         repeatable: True when a model may hold several terms of this effect.
@@ -151,6 +152,7 @@ class Effect:
     n_constants: Count = 0
     uses_acceleration: bool = False
     rate: Callable[..., float] | None = None
+    absent: Mapping[str, float] = field(default_factory=dict)
     regime: str = ""
     looks_like: Mapping[str, str] = field(default_factory=dict)
     repeatable: bool = False
@@ -165,6 +167,22 @@ class Effect:
         """Its compiled functions by their role."""
         roles = ("level", "force", "slip", "command", "uncommand", "play", "link", "remember", "prepare")
         return {role: getattr(self, role) for role in roles if getattr(self, role) is not None}
+
+    @property
+    def amplitudes(self) -> tuple[str, ...]:
+        """The parameters that say how strong the effect is; none when no value of a parameter makes it vanish."""
+        if self.slip is not None or self.link is not None or self.play is not None:
+            return ()
+        return tuple(p.name for p in self.parameters if p.linear or p.name in self.absent)
+
+    @property
+    def neutral(self) -> tuple[float, ...] | None:
+        """Values at which a model with the effect moves as one without it; None when there are none."""
+        if not self.amplitudes:
+            return None
+        without = {p.name: 0.0 for p in self.parameters if p.linear} | dict(self.absent)
+        rest = {p.name: 1.0 for p in self.parameters if p.default is None}
+        return tuple(self.values(rest | without))
 
     def values(self, given: Mapping[str, Any]) -> Sequence[float]:
         """The parameters' values in order, defaults filled in; KeyError when one without default is missing."""

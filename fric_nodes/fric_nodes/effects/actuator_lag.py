@@ -35,6 +35,7 @@ EFFECT = Effect(
     parameters=(Parameter("time", "T", "s", "time constant of the force", positive=True),),
     command=command,
     n_memory=1,
+    absent={"time": 1e-12},
     regime="quick changes of the command, at every speed: the motion answers late and rounded",
     looks_like={
         "delay": "command a step against a stop: a lag begins at once and bends, a delay waits and jumps",

@@ -37,6 +37,7 @@ EFFECT = Effect(
     parameters=(Parameter("time", "T", "s", "time between command and force", positive=True),),
     command=command,
     n_memory=delay_line.N_STATES,
+    absent={"time": 1e-12},
     regime="every change of the command: the motion answers late by the same time",
     looks_like={
         "actuator_lag": "command a step against a stop: a lag begins at once and bends, a delay waits and jumps",

@@ -50,6 +50,7 @@ EFFECT = Effect(
     remember=remember,
     n_memory=delay_line.N_STATES,
     rate=_rate,
+    absent={"time": 1e-12},
     regime="low speed crossed quickly: more force while speeding up than while slowing down",
     looks_like={
         "accel_hysteresis": "cross low speed at graded accelerations: a lag's loop widens with them, the other doesn't change",

@@ -34,6 +34,7 @@ EFFECT = Effect(
     parameters=(Parameter("width", "w", "F", "half width: what a command loses to either side", lower=0.0),),
     command=command,
     uncommand=uncommand,
+    absent={"width": 0.0},
     regime="commands around zero: nothing happens, and larger ones lose a constant part",
     looks_like={
         "coulomb": "let it coast: friction stops a body that moves, a dead zone lets it roll",

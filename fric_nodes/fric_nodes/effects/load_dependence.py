@@ -31,6 +31,7 @@ EFFECT = Effect(
         Parameter("coefficient", "c", "1", "relative change of the level per relative change of the load", default=1.0),
     ),
     level=level,
+    absent={"coefficient": 0.0},
     regime="wherever the normal load changes, in both directions of motion",
     looks_like={
         "bias": "change the load and drive in both directions: friction by load changes its sign with the velocity",

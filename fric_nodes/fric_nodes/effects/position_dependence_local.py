@@ -41,6 +41,7 @@ EFFECT = Effect(
         Parameter("width", "w", "x", "standard width of the bell", positive=True),
     ),
     level=level,
+    absent={"amplitude": 0.0},
     regime="one place of the travel, in both directions, at every passage",
     looks_like={
         "ripple": "compare the two directions at the place: friction changes its sign, a ripple doesn't",

@@ -36,6 +36,7 @@ EFFECT = Effect(
         Parameter("period", "L", "x", "distance after which friction repeats", positive=True),
     ),
     level=level,
+    absent={"cosine": 0.0, "sine": 0.0},
     regime="the whole travel, in both directions: friction repeats with the place",
     looks_like={
         "ripple": "compare the two directions at one place: friction changes its sign, a ripple doesn't",

@@ -35,6 +35,7 @@ EFFECT = Effect(
     parameters=(Parameter("limit", "L", "F", "largest force of the actuator", positive=True),),
     command=command,
     uncommand=uncommand,
+    absent={"limit": 1e300},
     regime="the largest commands: the motion falls short of them",
     looks_like={
         "actuator_lag": "hold the large command: a lag gets there in time, a saturated actuator never does",

@@ -39,6 +39,7 @@ EFFECT = Effect(
     ),
     level=level,
     force=force,
+    absent={"level_change": 0.0, "viscous_change": 0.0},
     regime="a warm machine against a cold one, at the same motion",
     looks_like={
         "time_drift": "stop for long, let it cool, run again: what comes back is temperature",

@@ -33,6 +33,7 @@ EFFECT = Effect(
         Parameter("time", "tau", "s", "time constant of the change", positive=True),
     ),
     level=level,
+    absent={"change": 0.0},
     regime="the first part of a recording against its later ones, at the same motion",
     looks_like={
         "temperature": "stop for long, let it cool, run again: a run-in doesn't start anew",

@@ -29,6 +29,7 @@ EFFECT = Effect(
     source="first-order expansion of a slow change",
     parameters=(Parameter("rate", "r", "1/s", "relative change per second", default=0.0),),
     level=level,
+    absent={"rate": 0.0},
     regime="one part of a recording against another, at the same motion",
     looks_like={
         "temperature": "stop for long and run again: with temperature friction comes back, with wear it doesn't",

@@ -58,13 +58,17 @@ class Loops:
         simulate: motion from force.
         predict: force from motion.
         observe: one-step prediction along measured positions.
+        lead: motion along a given one, and the force that it takes.
         respond: the command path alone.
+        fan: many copies of the plant over one interval; with its work space as an argument, being called at every sample.
     """
 
     simulate: Callable[..., None]
     predict: Callable[..., None]
     observe: Callable[..., None]
+    lead: Callable[..., None]
     respond: Callable[..., None]
+    fan: Callable[..., None]
 
 
 def loops_for(plant: Plant, effects: Sequence[Effect]) -> Loops:

@@ -29,7 +29,7 @@ from .assembled import (
 )
 from .kernel import kernel, local_array
 
-__all__ = ["LOOPS", "advance", "observe", "predict", "respond", "simulate"]
+__all__ = ["LOOPS", "advance", "fan", "lead", "observe", "predict", "respond", "simulate"]
 
 
 @kernel
@@ -154,6 +154,37 @@ def observe(
         states[j] = x[j]
 
 
+def lead(
+    p: Any, u: Any, q: Any, v: Any, h: Any, n_sub: int, load: Any, temperature: Any, stiffness: float, damping: float,
+    states: Any, z: Any, memory: Any, y_out: Any, u_out: Any, z_next: Any, constants: Any,
+) -> None:  # fmt: skip
+    """Lead the model along a motion: a stiff spring and damper add to ``u`` what it takes to be at ``q`` with ``v``.
+
+    ``q[k]`` and ``v[k]`` are wanted at the beginning of interval k, of length ``h[k]`` [s]; ``y_out[k]`` is the sensor's position
+    at its end and ``u_out[k]`` the command over it: together they are a recording of this model on that motion.
+    """
+    prepare(p, constants)
+    p = unpacked(p)
+    x, x_next = local_array(N_STATES), local_array(N_STATES)
+    for j in range(N_STATES):
+        x[j] = states[j]
+    s = Inner(z, z_next, memory, constants)
+    t = 0.0
+    for k in range(u.shape[0]):
+        h_sub = h[k] / n_sub
+        load_k = load[k] if load.shape[0] > 1 else load[0]
+        temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
+        given = u[k] + stiffness * (q[k] - x[SEEN]) + damping * (v[k] - x[SEEN_RATE])
+        for m in range(n_sub):
+            around = Surroundings(t + m * h_sub, load_k, temperature_k)
+            advance(p, x, x_next, s, command(given, h_sub, memory, p), h_sub, around)
+        y_out[k] = x[SEEN]
+        u_out[k] = given
+        t += h[k]
+    for j in range(N_STATES):
+        states[j] = x[j]
+
+
 def respond(p: Any, u: Any, h: float, n_sub: int, memory: Any, applied_out: Any) -> None:
     """What comes out of the command path, its mean over each interval, ``(len(u),)``, when ``u[k]`` is commanded over it."""
     p = unpacked(p)
@@ -164,5 +195,32 @@ def respond(p: Any, u: Any, h: float, n_sub: int, memory: Any, applied_out: Any)
         applied_out[k] = applied / n_sub
 
 
-LOOPS = (simulate, predict, observe, respond)
+def fan(
+    p: Any, u: Any, h: float, n_sub: int, around: Any, states: Any, slips: Any, memories: Any,
+    friction_out: Any, z_next: Any, constants: Any,
+) -> None:  # fmt: skip
+    """Lead many copies of the plant over one interval of ``h`` [s], each from its own state, with its own values and force.
+
+    ``p`` is ``(n, n_parameters)``, ``u`` ``(n,)``; ``states``, ``slips`` and ``memories`` have one row for each copy and are led
+    on in place. ``around`` holds time [s], relative load and temperature difference at the start; ``friction_out`` ``(n,)`` the
+    contact's mean friction force [F].
+    """
+    x, x_next = local_array(N_STATES), local_array(N_STATES)
+    h_sub = h / n_sub
+    for i in range(u.shape[0]):
+        prepare(p[i], constants)
+        values = unpacked(p[i])
+        s = Inner(slips[i], z_next, memories[i], constants)
+        for j in range(N_STATES):
+            x[j] = states[i, j]
+        total = 0.0
+        for m in range(n_sub):
+            moment = Surroundings(around[0] + m * h_sub, around[1], around[2])
+            total += advance(values, x, x_next, s, command(u[i], h_sub, memories[i], values), h_sub, moment)
+        for j in range(N_STATES):
+            states[i, j] = x[j]
+        friction_out[i] = total / n_sub
+
+
+LOOPS = (simulate, predict, observe, lead, respond, fan)
 """The loops, in the order of :class:`fric_nodes.engine.compile.Loops`."""

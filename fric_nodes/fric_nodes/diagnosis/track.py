@@ -1,0 +1,217 @@
+"""What a model lacks, as a force over time: an observer follows the measured motion and reports the force it had to add.
+
+Between two samples the model moves under the recorded force; at each sample its position and velocity are pulled to the measured
+position by constant gains with a double pole at exp(-w h). A constant force that the model lacks shows, after the observer has
+settled, as the innovation e = f h^2 / (m beta), so that
+
+    r = m beta e / h^2
+
+is the missing force, low-passed without loss at frequency zero by two poles at w and late by 2/w. It is defined for every plant and
+every term (friction that sticks exactly, bristles, a body behind a gap, a lagging command), at rest as well as in motion, and
+needs no derivative of the measured position. The force that the model would have needed for the motion is u + r.
+Source: the alpha-beta filter as in :mod:`fric_nodes.identification.innovations`; r as a force is derived here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..identification.gauss_newton import Solution, minimise
+from ..identification.innovations import Run, noise_of, runs_of
+from ..model import Model
+from ..record import Array, Index, Record
+from ..simulate import substeps
+from .universe import universe_of
+
+__all__ = ["Track", "resolution"]
+
+_STEP_OF_RATE = 0.2
+_SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
+_SHAKEN = 0.4  # steps of the encoder that count as its noise
+_LARGEST = 1e6  # of the force range; a model that escapes must cost much, not break the solver
+
+
+def resolution(position: Array) -> float:
+    """The step of the encoder [x]: the smallest change that is common; 0 when there is none."""
+    change = np.abs(np.diff(position))
+    change = change[change > 0.0]
+    if change.size < 20:
+        return 0.0
+    smallest = float(np.quantile(change, 0.02))
+    counts = change / smallest
+    return smallest if float(np.mean(np.abs(counts - np.round(counts)) < 0.05)) > 0.9 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Recordings to follow, and how.
+
+    Attributes:
+        runs: contiguous parts of the recordings.
+        time: start of each run in its record [s].
+        record: number of each run's record.
+        bandwidth: w [rad/s].
+        mass: by which an innovation becomes a force [F s^2/x].
+        noise: of the position for each run [x].
+    """
+
+    runs: tuple[Run, ...]
+    time: tuple[Array, ...]
+    record: tuple[int, ...]
+    bandwidth: float
+    mass: float
+    noise: tuple[float, ...]
+
+    @classmethod
+    def of(cls, records: Sequence[Record], bandwidth: float, model: Model) -> Track:
+        """Follow ``records`` with ``bandwidth`` [rad/s]; the inertia of ``model`` makes forces of innovations."""
+        runs: list[Run] = []
+        time: list[Array] = []
+        number: list[int] = []
+        noise: list[float] = []
+        for k, record in enumerate(records):
+            found = runs_of(record)
+            bounds = np.flatnonzero(np.diff(np.concatenate([[False], record.mask, [False]]).astype(np.int8)))
+            starts = [int(first) for first, last in zip(bounds[::2], bounds[1::2], strict=True) if last - first >= 200]
+            for run, first in zip(found, starts, strict=True):
+                runs.append(run)
+                time.append(record.time[first] + np.cumsum(run.step))
+                number.append(k)
+                noise.append(max(noise_of(run.position), _SHAKEN * resolution(run.position)))
+        mass = model.plant.total_inertia(*model.plant_values)
+        return cls(tuple(runs), tuple(time), tuple(number), bandwidth, mass, tuple(noise))
+
+    @property
+    def starts(self) -> Index:
+        """First residual of each run."""
+        return np.cumsum([0, *(run.effort.shape[0] - self._settling(run) for run in self.runs)])[:-1]
+
+    def _settling(self, run: Run) -> int:
+        return min(max(math.ceil(_SETTLING / (self.bandwidth * float(np.median(run.step)))), 20), run.effort.shape[0] // 3)
+
+    def joined(self, of_run: Sequence[Array]) -> Array:
+        """Signals with one value per interval of each run, without the settling, joined, shape ``(n,)``."""
+        return np.concatenate([part[self._settling(run) :] for run, part in zip(self.runs, of_run, strict=True)])
+
+    def split(self, joined: Array) -> list[Array]:
+        """What :meth:`joined` gives, per run."""
+        return np.split(joined, self.starts[1:])
+
+    def gains(self, run: Run, share: float = 1.0) -> tuple[float, float]:
+        """Alpha and beta at the run's sample time; ``share`` of the mass is what the sensor sees."""
+        z = math.exp(-self.bandwidth * float(np.median(run.step)))
+        return min((1.0 - z * z) / share, 1.0), min((1.0 - z) ** 2 / share, 1.0)
+
+    def residual(self, model: Model, efforts: Sequence[Array] | None = None, positions: Sequence[Array] | None = None) -> Array:
+        """The force that ``model`` lacks [F] at the end of each interval, shape ``(n,)``.
+
+        Args:
+            model: that follows.
+            efforts: other forces than the recorded ones, per run.
+            positions: other positions than the recorded ones, per run.
+        """
+        universe = universe_of(model)
+        values = universe.values(model)
+        plant_values = np.array(model.plant_values)
+        share = model.plant.sensed_inertia(*model.plant_values) / model.plant.total_inertia(*model.plant_values)
+        parts = []
+        for k, run in enumerate(self.runs):
+            effort = run.effort if efforts is None else efforts[k]
+            position = run.position if positions is None else positions[k]
+            alpha, beta = self.gains(run, share)
+            state = np.ascontiguousarray(universe.plant.start(plant_values, *run.start), dtype=np.float64)
+            found = np.empty(effort.shape[0])
+            universe.loops.observe(
+                values, effort, position, run.step, self.n_substeps(model, run), run.load, run.temperature,
+                alpha, beta, self.noise[k], state, *universe.inner_states(model), found,
+            )  # fmt: skip
+            scale = self.mass * self.gains(run)[1] / float(np.median(run.step)) ** 2
+            parts.append(scale * found)
+        most = _LARGEST * max(float(np.ptp(run.effort)) for run in self.runs)
+        return np.clip(np.nan_to_num(self.joined(parts), nan=most, posinf=most, neginf=-most), -most, most)
+
+    def n_substeps(self, model: Model, run: Run) -> int:
+        """Steps of ``model`` per sample."""
+        return min(substeps(model, float(np.median(run.step)), _STEP_OF_RATE), 60)
+
+    def seen(self, of_run: Sequence[Array]) -> Array:
+        """A force per interval as the observer would see it, were it missing: filtered, joined, shape ``(n,)``."""
+        parts = []
+        for run, force in zip(self.runs, of_run, strict=True):
+            alpha, beta = self.gains(run)
+            parts.append(np.asarray(lfilter([0.0, beta], [1.0, alpha + beta - 2.0, 1.0 - alpha], force), dtype=np.float64))
+        return self.joined(parts)
+
+    def residuals(self, models: Sequence[Model]) -> list[Array]:
+        """:meth:`residual` of several models, on all cores."""
+        with ThreadPoolExecutor(2) as pool:
+            return list(pool.map(self.residual, models))
+
+    def fit(self, model: Model, names: Sequence[str], max_iterations: int = 12, bounds: Bounds | None = None) -> Fit:
+        """``model`` with the parameters ``names`` such that it lacks the least force."""
+        index = np.array([model.names.index(name) for name in names], dtype=np.int64)
+        declared = [parameter.declaration for parameter in model.parameters()]
+        values = model.values
+        scale = np.abs(values[index])
+        scale[scale == 0.0] = 1.0
+        tiny = 1e-9
+        lower = np.array([max(declared[k].lower, tiny * s if declared[k].positive else -np.inf) for k, s in zip(index, scale, strict=True)])
+        upper = np.array([declared[k].upper for k in index])
+        if bounds is not None:
+            for k, name in enumerate(names):
+                low, high = bounds.get(name, (-np.inf, np.inf))
+                lower[k], upper[k] = max(lower[k], low), min(upper[k], high)
+
+        def at(point: Array) -> Model:
+            trial = values.copy()
+            trial[index] = point * scale
+            return model.with_values(trial)
+
+        answer = minimise(
+            lambda point: self.residual(at(point)),
+            values[index] / scale,
+            lower / scale,
+            upper / scale,
+            difference=1e-3,
+            point_tolerance=1e-4,
+            cost_tolerance=1e-5,
+            max_iterations=max_iterations,
+        )
+        return Fit(at(answer.point), tuple(names), answer, scale)
+
+
+Bounds = dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model that has been fitted to a track.
+
+    Attributes:
+        model: with its values.
+        names: of the parameters that were free.
+        solution: residual [F] and Jacobian at the optimum, in units of ``scale``.
+        scale: of each free parameter.
+    """
+
+    model: Model
+    names: tuple[str, ...]
+    solution: Solution
+    scale: Array
+
+    @property
+    def residual(self) -> Array:
+        """The force that is missing [F], shape ``(n,)``."""
+        return self.solution.residual
+
+    @property
+    def jacobian(self) -> Array:
+        """Derivative of the residual, shape ``(n, n_free)``, per ``scale`` of each parameter."""
+        return self.solution.jacobian
+
