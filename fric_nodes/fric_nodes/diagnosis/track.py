@@ -1,21 +1,21 @@
 """What a model lacks, as a force over time: an observer follows the measured motion and reports the force it had to add.
 
-Between two samples the model moves under the recorded force; at each sample its position and velocity are pulled to the measured
-position by constant gains with a double pole at exp(-w h). A constant force that the model lacks shows, after the observer has
-settled, as the innovation e = f h^2 / (m beta), so that
+Between two samples the model moves under the recorded force; at each sample its position and velocity are pulled to the
+measured position by constant gains with a double pole at exp(-w h). A constant force that the model lacks shows, after the
+observer has settled, as the innovation e = f h^2 / (m beta), so that
 
     r = m beta e / h^2
 
-is the missing force, low-passed without loss at frequency zero by two poles at w and late by 2/w. It is defined for every plant and
-every term (friction that sticks exactly, bristles, a body behind a gap, a lagging command), at rest as well as in motion, and
-needs no derivative of the measured position. The force that the model would have needed for the motion is u + r.
+is the missing force, low-passed without loss at frequency zero by two poles at w and late by 2/w. It is defined for every plant
+and every term (friction that sticks exactly, bristles, a body behind a gap, a lagging command), at rest as well as in motion,
+and needs no derivative of the measured position. The force that the model would have needed for the motion is u + r.
 Source: the alpha-beta filter as in :mod:`fric_nodes.identification.innovations`; r as a force is derived here.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -59,6 +59,7 @@ class Track:
         bandwidth: w [rad/s].
         mass: by which an innovation becomes a force [F s^2/x].
         noise: of the position for each run [x].
+        sizes: typical size of a linear parameter by its dimension, for those that are near zero.
     """
 
     runs: tuple[Run, ...]
@@ -67,6 +68,7 @@ class Track:
     bandwidth: float
     mass: float
     noise: tuple[float, ...]
+    sizes: Mapping[str, float]
 
     @classmethod
     def of(cls, records: Sequence[Record], bandwidth: float, model: Model) -> Track:
@@ -85,7 +87,7 @@ class Track:
                 number.append(k)
                 noise.append(max(noise_of(run.position), _SHAKEN * resolution(run.position)))
         mass = model.plant.total_inertia(*model.plant_values)
-        return cls(tuple(runs), tuple(time), tuple(number), bandwidth, mass, tuple(noise))
+        return cls(tuple(runs), tuple(time), tuple(number), bandwidth, mass, tuple(noise), _sizes(runs, mass))
 
     @property
     def starts(self) -> Index:
@@ -93,7 +95,7 @@ class Track:
         return np.cumsum([0, *(run.effort.shape[0] - self._settling(run) for run in self.runs)])[:-1]
 
     def _settling(self, run: Run) -> int:
-        return min(max(math.ceil(_SETTLING / (self.bandwidth * float(np.median(run.step)))), 20), run.effort.shape[0] // 3)
+        return int(min(max(math.ceil(_SETTLING / (self.bandwidth * float(np.median(run.step)))), 20), run.effort.shape[0] // 3))
 
     def joined(self, of_run: Sequence[Array]) -> Array:
         """Signals with one value per interval of each run, without the settling, joined, shape ``(n,)``."""
@@ -103,10 +105,17 @@ class Track:
         """What :meth:`joined` gives, per run."""
         return np.split(joined, self.starts[1:])
 
-    def gains(self, run: Run, share: float = 1.0) -> tuple[float, float]:
-        """Alpha and beta at the run's sample time; ``share`` of the mass is what the sensor sees."""
+    def padded(self, joined: Array) -> list[Array]:
+        """What :meth:`joined` gives, per run, with zeros where the observer was settling."""
+        parts = []
+        for run, part in zip(self.runs, self.split(joined), strict=True):
+            parts.append(np.concatenate([np.zeros(run.effort.shape[0] - part.shape[0]), part]))
+        return parts
+
+    def gains(self, run: Run) -> tuple[float, float]:
+        """Alpha and beta at the run's sample time."""
         z = math.exp(-self.bandwidth * float(np.median(run.step)))
-        return min((1.0 - z * z) / share, 1.0), min((1.0 - z) ** 2 / share, 1.0)
+        return 1.0 - z * z, (1.0 - z) ** 2
 
     def residual(self, model: Model, efforts: Sequence[Array] | None = None, positions: Sequence[Array] | None = None) -> Array:
         """The force that ``model`` lacks [F] at the end of each interval, shape ``(n,)``.
@@ -119,12 +128,11 @@ class Track:
         universe = universe_of(model)
         values = universe.values(model)
         plant_values = np.array(model.plant_values)
-        share = model.plant.sensed_inertia(*model.plant_values) / model.plant.total_inertia(*model.plant_values)
         parts = []
         for k, run in enumerate(self.runs):
             effort = run.effort if efforts is None else efforts[k]
             position = run.position if positions is None else positions[k]
-            alpha, beta = self.gains(run, share)
+            alpha, beta = self.gains(run)
             state = np.ascontiguousarray(universe.plant.start(plant_values, *run.start), dtype=np.float64)
             found = np.empty(effort.shape[0])
             universe.loops.observe(
@@ -158,10 +166,13 @@ class Track:
         index = np.array([model.names.index(name) for name in names], dtype=np.int64)
         declared = [parameter.declaration for parameter in model.parameters()]
         values = model.values
-        scale = np.abs(values[index])
+        # A parameter near zero is scaled by what would matter, or it could never leave.
+        scale = np.array([max(abs(values[k]), self.sizes.get(declared[k].dimension, 0.0)) for k in index])
         scale[scale == 0.0] = 1.0
         tiny = 1e-9
-        lower = np.array([max(declared[k].lower, tiny * s if declared[k].positive else -np.inf) for k, s in zip(index, scale, strict=True)])
+        lower = np.array(
+            [max(declared[k].lower, tiny * s if declared[k].positive else -np.inf) for k, s in zip(index, scale, strict=True)]
+        )
         upper = np.array([declared[k].upper for k in index])
         if bounds is not None:
             for k, name in enumerate(names):
@@ -184,6 +195,24 @@ class Track:
             max_iterations=max_iterations,
         )
         return Fit(at(answer.point), tuple(names), answer, scale)
+
+
+def _sizes(runs: Sequence[Run], mass: float) -> dict[str, float]:
+    """A twentieth of what the forces and motions of the runs would make a linear parameter."""
+    if not runs:
+        return {}
+    force = 0.05 * max(float(np.std(np.concatenate([run.effort for run in runs]))), 1e-12)
+    speed = max([1e-12, *(float(np.std(np.diff(run.position) / run.step[1:])) for run in runs)])
+    travel = max(float(np.ptp(np.concatenate([run.position for run in runs]))), 1e-12)
+    return {
+        "F": force,
+        "F s/x": force / speed,
+        "F s^2/x^2": force / speed**2,
+        "F/x": force / travel,
+        "F/x^3": force / travel**3,
+        "F s^2/x": 0.05 * mass,
+        "1": 0.05,
+    }
 
 
 Bounds = dict[str, tuple[float, float]]
@@ -214,4 +243,3 @@ class Fit:
     def jacobian(self) -> Array:
         """Derivative of the residual, shape ``(n, n_free)``, per ``scale`` of each parameter."""
         return self.solution.jacobian
-

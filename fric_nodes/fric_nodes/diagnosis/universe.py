@@ -1,9 +1,10 @@
 """Every candidate effect in one compiled structure, absent until it is given values.
 
-A diagnosis tries hundreds of models: each candidate, alone and with others. Compiling a structure for each would take minutes, so
-there is one structure that holds all effects which some value of a parameter makes vanish (:attr:`fric_nodes.effect.Effect.neutral`),
-and a model is a vector of values for it. Slip dynamics and transmissions have no such value: they change what the states are.
-A structure that holds one of them is a further universe, and there are as many as models ask for.
+A diagnosis tries hundreds of models: each candidate, alone and with others. Compiling a structure for each would take minutes,
+so there is one structure that holds all effects which some value of a parameter makes vanish
+(:attr:`fric_nodes.effect.Effect.neutral`), and a model is a vector of values for it. Slip dynamics and transmissions have no
+such value: they change what the states are. A structure that holds one of them is a further universe, and there are as many as
+models ask for.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ import numpy as np
 from ..effect import Effect, Place
 from ..effects import EFFECTS
 from ..engine.compile import Loops, loops_for
-from ..model import Model
+from ..model import Model, Term
 from ..plant import Plant
 from ..record import Array
 
-__all__ = ["Universe", "common_effects", "universe_of"]
+__all__ = ["Universe", "common_effects", "universe_of", "worth_trying"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class Universe:
         plant: kind of plant, its driven form where the structure holds a transmission.
         effects: in the order of assembly.
         loops: compiled.
-        neutral: values at which every effect is absent, the plant's own zero, shape ``(n_values,)``.
+        neutral: values at which every effect is absent and switched off, the plant's own zero, shape ``(n_values,)``.
         offset: of each effect's first value, by its key.
         n_memory: number of states in the memory.
     """
@@ -49,9 +50,14 @@ class Universe:
         values = self.neutral.copy()
         values[: len(model.plant_values)] = model.plant_values
         for held in model.terms:
-            at = self.offset[held.effect.key]
-            values[at : at + len(held.values)] = held.values
+            self.put(values, held)
         return values
+
+    def put(self, values: Array, term: Term) -> None:
+        """Switch ``term`` on in ``values``."""
+        at = self.offset[term.effect.key]
+        values[at : at + len(term.values)] = term.values
+        values[len(values) - len(self.effects) + self.effects.index(term.effect)] = 1.0
 
     def inner_states(self, model: Model) -> tuple[Array, Array]:
         """States of the slip dynamics and memory of all effects at the start of a run."""
@@ -61,10 +67,19 @@ class Universe:
 
 @lru_cache(maxsize=1)
 def common_effects() -> tuple[Effect, ...]:
-    """The effects that every universe holds: one law of each kind, or all where no law is the usual one."""
-    able = [effect for effect in EFFECTS.values() if effect.neutral is not None]
-    with_usual = {effect.id for effect in EFFECTS.values() if effect.usual}
-    return tuple(effect for effect in able if effect.usual or effect.id not in with_usual)
+    """The effects that every universe holds: those that can be absent, see :func:`worth_trying`."""
+    return tuple(effect for effect in worth_trying() if effect.neutral is not None)
+
+
+@lru_cache(maxsize=1)
+def worth_trying() -> tuple[Effect, ...]:
+    """One law of each effect, or all where no law is the usual one; a law that can be absent beside a usual one that can't."""
+    usual = {effect.id: effect for effect in EFFECTS.values() if effect.usual}
+    return tuple(
+        effect
+        for effect in EFFECTS.values()
+        if effect.usual or effect.id not in usual or (effect.neutral is not None and usual[effect.id].neutral is None)
+    )
 
 
 def universe_of(model: Model) -> Universe:
@@ -85,5 +100,6 @@ def _universe(plant: Plant, own: tuple[str, ...]) -> Universe:
     for effect in effects:
         offset[effect.key] = len(neutral)
         neutral += effect.neutral or [1.0] * len(effect.parameters)
+    neutral += [0.0] * len(effects)  # the switches
     n_memory = sum(effect.n_memory for effect in effects)
-    return Universe(plant, tuple(effects), loops_for(plant, effects), np.array(neutral), offset, n_memory)
+    return Universe(plant, tuple(effects), loops_for(plant, effects, switched=True), np.array(neutral), offset, n_memory)

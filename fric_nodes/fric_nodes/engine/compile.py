@@ -71,14 +71,21 @@ class Loops:
     fan: Callable[..., None]
 
 
-def loops_for(plant: Plant, effects: Sequence[Effect]) -> Loops:
-    """The compiled loops for ``plant`` with ``effects`` in this order."""
-    return _loops_for(plant, tuple(effects))
+def loops_for(plant: Plant, effects: Sequence[Effect], switched: bool = False) -> Loops:
+    """The compiled loops for ``plant`` with ``effects`` in this order.
+
+    Args:
+        plant: what moves.
+        effects: its terms.
+        switched: give every effect that can be absent a switch: the values end with one number per effect then, and an effect
+            whose number is 0 costs no more than the look at it.
+    """
+    return _loops_for(plant, tuple(effects), switched)
 
 
 @lru_cache(maxsize=256)
-def _loops_for(plant: Plant, effects: tuple[Effect, ...]) -> Loops:
-    source = _source(plant, effects)
+def _loops_for(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> Loops:
+    source = _source(plant, effects, switched)
     module = _import(source, _fingerprint(plant, effects, source))
     n_constants = _counter(plant, effects)
     names = [function.__name__ for function in loops.LOOPS]
@@ -119,7 +126,7 @@ def _with_work_space(loop: Callable[..., None], n_constants: Callable[[Array], i
 class _Assembly:
     """The bodies of a model's functions, grown effect by effect; see :mod:`fric_nodes.engine.assembled` for what each is."""
 
-    def __init__(self, at: int) -> None:
+    def __init__(self, at: int, switches: int | None) -> None:
         self.imports: list[str] = list(_IMPORTS)
         self.level: list[str] = []
         self.force: list[str] = []
@@ -129,6 +136,7 @@ class _Assembly:
         self.play: list[str] = []
         self.prepare: list[str] = []
         self._at = at
+        self._switches = switches
         self._memory = 0
         self._constants: list[str] = []
 
@@ -142,17 +150,19 @@ class _Assembly:
         def call(role: str, *first: str) -> str:
             return f"{role}_{number}({', '.join((*first, *parameters))})"
 
+        optional = self._switches is not None and effect.neutral is not None
+        switch = f"if p[{self._switches + number}] != 0.0: " if self._switches is not None and optional else ""
         kept = (str(self._memory),) if effect.n_memory else ()
         if effect.remember is not None:
-            self.remember.append(f"    {call('remember', 'c', 'total' if effect.level else '0.0', *kept)}")
+            self.remember.append(f"    {switch}{call('remember', 'c', 'total' if effect.level else '0.0', *kept)}")
         if effect.level is not None:
-            line = f"    total = {call('level', 'c', 'total', *kept)}"
+            line = f"    {switch}total = {call('level', 'c', 'total', *kept)}"
             self.level.append(line)
             self.remember.append(line)
         if effect.force is not None:
-            self.force.append(f"    total += {call('force', 'c', *kept)}")
+            self.force.append(f"    {switch}total += {call('force', 'c', *kept)}")
         if effect.command is not None:
-            self.command.append(f"    u = {call('command', 'u', 'h', 'memory', str(self._memory))}")
+            self.command.append(f"    {switch}u = {call('command', 'u', 'h', 'memory', str(self._memory))}")
         if effect.play is not None:
             self.play.append(f"    total += {call('play')}")
         constants = self._prepare(call) if effect.prepare is not None else ()
@@ -177,12 +187,13 @@ def _links(effects: tuple[Effect, ...], at: int) -> list[str]:
     return lines[False] or lines[True]
 
 
-def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
+def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
     """Text of the module that binds the structure's functions together."""
-    parts = _Assembly(len(plant.parameters))
+    n_parameters = len(plant.parameters) + sum(len(effect.parameters) for effect in effects)
+    parts = _Assembly(len(plant.parameters), n_parameters if switched else None)
     for number, effect in enumerate(effects):
         parts.add(number, effect)
-    n_parameters = len(plant.parameters) + sum(len(effect.parameters) for effect in effects)
+    n_parameters += len(effects) if switched else 0
     lines = [
         f'"""Assembled for: {plant.id} | {", ".join(effect.key for effect in effects) or "no terms"}."""',
         *parts.imports,

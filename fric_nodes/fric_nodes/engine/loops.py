@@ -128,7 +128,8 @@ def observe(
 
     ``innovation[k]`` is ``y[k]`` minus its prediction [x], for ``len(u)`` intervals of lengths ``h`` [s]. The correction has
     the constant gains of an alpha-beta filter. A contact that sticks exactly is left at rest while the innovation stays within
-    three times ``noise`` [x]: the noise of an encoder must not shake it loose.
+    three times ``noise`` [x]: the noise of an encoder must not shake it loose. Where the sensor sees a motor, the load is
+    carried along, unless it sticks: what was learnt about both together must not push the one into the other.
     """
     prepare(p, constants)
     p = unpacked(p)
@@ -146,6 +147,10 @@ def observe(
             advance(p, x, x_next, s, command(u[k], h_sub, memory, p), h_sub, around)
         e = y[k] - x[SEEN]
         innovation[k] = e
+        if SEEN != 0:
+            x[0] += alpha * e
+            if x[1] != 0.0:
+                x[1] += beta * e / h[k]
         x[SEEN] += alpha * e
         if not (RIGID and x[SEEN_RATE] == 0.0 and abs(e) <= 3.0 * noise):
             x[SEEN_RATE] += beta * e / h[k]
@@ -160,8 +165,8 @@ def lead(
 ) -> None:  # fmt: skip
     """Lead the model along a motion: a stiff spring and damper add to ``u`` what it takes to be at ``q`` with ``v``.
 
-    ``q[k]`` and ``v[k]`` are wanted at the beginning of interval k, of length ``h[k]`` [s]; ``y_out[k]`` is the sensor's position
-    at its end and ``u_out[k]`` the command over it: together they are a recording of this model on that motion.
+    ``q[k]`` and ``v[k]`` are wanted at the beginning of interval k, of length ``h[k]`` [s]; ``y_out[k]`` is the sensor's
+    position at its end and ``u_out[k]`` the command over it: together they are a recording of this model on that motion.
     """
     prepare(p, constants)
     p = unpacked(p)
@@ -201,9 +206,9 @@ def fan(
 ) -> None:  # fmt: skip
     """Lead many copies of the plant over one interval of ``h`` [s], each from its own state, with its own values and force.
 
-    ``p`` is ``(n, n_parameters)``, ``u`` ``(n,)``; ``states``, ``slips`` and ``memories`` have one row for each copy and are led
-    on in place. ``around`` holds time [s], relative load and temperature difference at the start; ``friction_out`` ``(n,)`` the
-    contact's mean friction force [F].
+    ``p`` is ``(n, n_parameters)``, ``u`` ``(n,)``; ``states``, ``slips`` and ``memories`` have one row for each copy and are
+    led on in place. ``around`` holds time [s], relative load and temperature difference at the start; ``friction_out`` ``(n,)``
+    the contact's mean friction force [F].
     """
     x, x_next = local_array(N_STATES), local_array(N_STATES)
     h_sub = h / n_sub

@@ -42,10 +42,6 @@ def _whole(mass: float, load_share: float) -> float:
     return mass
 
 
-def _motor(mass: float, load_share: float) -> float:
-    return mass * (1.0 - load_share)
-
-
 def _initial(values: Array, position: float, velocity: float) -> Array:
     """Both together, in the middle of the play."""
     return np.array([position, velocity, position, velocity])
@@ -70,7 +66,6 @@ DRIVEN = Plant(
     functions=(*TRANSMISSION_FUNCTIONS, step, drive),
     inertia=_inertia,
     encoder=(2, 3),
-    sensed=_motor,
     whole=_whole,
     initial=_initial,
     signals=(Signal("load_position", "x", "position of the load, behind the transmission", _load_position),),

@@ -49,10 +49,6 @@ def _whole(motor_mass: float, load_mass: float, motor_coulomb: float, motor_visc
     return motor_mass + load_mass
 
 
-def _motor(motor_mass: float, load_mass: float, motor_coulomb: float, motor_viscous: float) -> float:
-    return motor_mass
-
-
 def _initial(values: Array, position: float, velocity: float) -> Array:
     """Both together, in the middle of the play."""
     return np.array([position, velocity, position, velocity])
@@ -84,7 +80,6 @@ _TEST_BED = Plant(
     functions=(*TRANSMISSION_FUNCTIONS, step, drive),
     inertia=_inertia,
     encoder=(2, 3),
-    sensed=_motor,
     whole=_whole,
     initial=_initial,
     signals=(

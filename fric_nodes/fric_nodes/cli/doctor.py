@@ -1,0 +1,107 @@
+"""``fric doctor``: is the installation in order, or are these recordings."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import InputError
+from .options import EndOption, JointOption, JsonOption, RepairOption, StartOption, TimeOption, TopicOption, progress
+
+if TYPE_CHECKING:
+    from ..instrument import Finding
+    from ..record import Record
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to ``app``."""
+    app.command("doctor", epilog="Example: fric doctor    or: fric doctor bags/slide --model axis.yaml")(doctor)
+
+
+def doctor(
+    recordings: Annotated[
+        list[Path] | None, typer.Argument(help="Recordings to check, of one joint; the installation when none is given.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", help="Model file whose mass and friction are believed: then units are judged too.")
+    ] = None,
+    gear_ratio: Annotated[
+        float | None, typer.Option("--gear-ratio", help="A gear ratio that may have been forgotten or applied twice.")
+    ] = None,
+    joint: JointOption = None,
+    repair: RepairOption = False,
+    time: TimeOption = "stamp",
+    start: StartOption = None,
+    end: EndOption = None,
+    topic: TopicOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check the installation, or what is wrong with recordings; exit status 1 when a fault is found."""
+    if not recordings:
+        _installation(as_json)
+        return
+    if gear_ratio is not None and not 0.0 < gear_ratio < float("inf"):
+        raise InputError("--gear-ratio", f"is {gear_ratio}", "give a positive number")
+    from ..instrument import inspect
+    from ..model_file import read_model
+    from .options import ReadOptions, read_all
+
+    records = read_all(recordings, ReadOptions(joint, repair, time, start, end, tuple(topic or ())))
+    nominal = None if model is None else read_model(model)
+    settings = {} if gear_ratio is None else {"gear_ratio": gear_ratio}
+    findings = inspect(records, nominal, settings)
+    faulty = any(finding.verdict == "fault" for finding in findings)
+    if as_json:
+        entries: list[dict[str, Any]] = [finding.as_json() for finding in findings]
+        typer.echo(json.dumps({"recordings": [str(path) for path in recordings], "faults": faulty, "checks": entries}))
+    else:
+        _print_findings(findings, [path.name for path in recordings], records)
+    if faulty:
+        raise typer.Exit(1)
+
+
+def _print_findings(findings: tuple[Finding, ...], names: list[str], records: list[Record]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from ..report.checks import checks_rows, checks_sentence
+
+    shown = Table(box=None, pad_edge=False)
+    for column in ("check", "verdict", "recording", "value", "what was found"):
+        shown.add_column(column, overflow="fold")
+    rows = checks_rows(findings, names)
+    several = len(names) > 1
+    for check, verdict, where, value, detail, _ in rows:
+        shown.add_row(check, verdict, where if several else "", value, detail)
+    console = Console(highlight=False, markup=False)
+    console.print(shown)
+    for record, name in zip(records, names, strict=True):
+        for note in record.notes:
+            console.print(f"- {name}: {note}")
+    for check, _, _, _, _, remedy in rows:
+        if remedy:
+            console.print(f"- {check}: {remedy}")
+    console.print(checks_sentence(findings))
+
+
+def _installation(as_json: bool) -> None:
+    from ..installation import examine
+
+    progress("checking the installation")
+    found = examine()
+    broken = any(item.state == "fault" for item in found)
+    if as_json:
+        entries = [{"check": item.name, "verdict": item.state, "detail": item.detail, "remedy": item.remedy} for item in found]
+        typer.echo(json.dumps({"faults": broken, "checks": entries}))
+    else:
+        for item in found:
+            typer.echo(f"{item.state:7s}  {item.name}: {item.detail}")
+            if item.remedy:
+                typer.echo(f"         {item.remedy}")
+    if broken:
+        raise typer.Exit(1)

@@ -1,0 +1,376 @@
+"""From recordings and a nominal model to a verdict: what is missing, where, how sure, and what unseen data say.
+
+In this order: faults of the instrument; parameters before structure; is anything missing at all, beside what a twin leaves;
+which effects, grown and pruned on blocks that no fit has seen; and then, once and for the record, the validation recordings,
+which no fit and no choice has touched.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..effect import Effect
+from ..effects import EFFECTS
+from ..errors import InputError
+from ..identification import METHODS
+from ..identification.equations import nominal_conditions
+from ..identification.result import IdentificationError, Options
+from ..identification.statistics import sandwich_covariance
+from ..instrument import Finding as Check
+from ..instrument import inspect
+from ..model import Model
+from ..record import Array, Record
+from .candidates import Scales, candidates, place_of, scales_of
+from .confidence import confidence_of, unknown_confidence
+from .grow import Growth, State, Step, grow, refit
+from .locate import Where, locate, moved_back, steady
+from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
+from .screen import Tried
+from .track import Fit, Track
+from .twin import twins
+
+__all__ = ["DiagnosisError", "diagnose"]
+
+_BANDWIDTHS = (45.0, 140.0, 400.0)  # [rad/s]
+_FAST = 1.0  # largest product of bandwidth and sample time
+_MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
+_UNEXPLAINED = 0.35  # of what was missing: with more left, something unknown remains
+_LOCATING = 300.0  # [rad/s], for spans of time
+
+
+class DiagnosisError(InputError):
+    """Recordings or a model that can't be compared."""
+
+
+def diagnose(
+    train: Sequence[Record], validation: Sequence[Record], nominal: Model, progress: Callable[[str], None] | None = None
+) -> Diagnosis:
+    """What ``nominal`` leaves out of what the recordings show.
+
+    Args:
+        train: recordings to learn from.
+        validation: recordings that nothing is learnt from.
+        nominal: model whose physics is in question; its values are a start.
+        progress: told what goes on.
+
+    Raises:
+        DiagnosisError: nothing can be compared.
+    """
+    tell = progress or (lambda _: None)
+    _refuse(train, validation)
+    tell("checking the instrument")
+    checks = inspect(train, nominal)
+    train, validation, corrected = _corrected(train, validation, checks)
+    conditions = nominal_conditions(train) | dict(nominal.nominal)
+    train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
+    tell("refitting the nominal model")
+    start = _started(nominal, train)
+    track, begin = _best_track(train, start)
+    growth = grow(track, begin.fit.model, tell)
+    tell("judging on the validation recordings")
+    return _concluded(train, validation, nominal, checks, corrected, track, growth)
+
+
+def _refuse(train: Sequence[Record], validation: Sequence[Record]) -> None:
+    if not train or not validation:
+        raise DiagnosisError("diagnose", "needs recordings to learn from and one held back", "give TRAIN and --validate")
+    for held in validation:
+        for other in train:
+            same = held.n_samples == other.n_samples and np.array_equal(held.position, other.position)
+            if same and np.array_equal(held.effort, other.effort):
+                raise DiagnosisError(
+                    held.source, "is the recording that is learnt from, too", "hold another recording back for --validate"
+                )
+    for record in (*train, *validation):
+        if float(np.ptp(record.position)) == 0.0:
+            raise DiagnosisError(record.source, "holds nothing but rest", "record the axis in motion")
+        if float(np.ptp(record.effort)) == 0.0:
+            raise DiagnosisError(record.source, "has no force signal: it never changes", "record the effort, or give --topic")
+
+
+def _corrected(
+    train: Sequence[Record], validation: Sequence[Record], checks: Sequence[Check]
+) -> tuple[list[Record], list[Record], list[str]]:
+    """The recordings without the faults of sign, unit and clock that can be taken out of all of them alike.
+
+    A delay is left in: it may belong to the axis, and is a candidate like others.
+    """
+    notes = []
+    held, kept_apart = list(train), list(validation)
+    for check in checks:
+        if check.verdict != "fault" or check.correction is None or check.correction.effort_shift != 0.0:
+            continue
+        if check.recording is None or len(held) == 1:
+            held = [check.correction.apply(record) for record in held]
+            kept_apart = [check.correction.apply(record) for record in kept_apart]
+        else:
+            held[check.recording] = check.correction.apply(held[check.recording])
+        notes.append(f"corrected before anything was fitted: {check.correction.text} ({check.detail})")
+    return held, kept_apart, notes
+
+
+def _started(nominal: Model, train: Sequence[Record]) -> Model:
+    """The nominal structure with values that a fit can start from."""
+    try:
+        found = METHODS["inverse-dynamics"].fit(replace(nominal, standard_errors={}), list(train), Options()).model
+    except (IdentificationError, np.linalg.LinAlgError):
+        return nominal
+    return found if np.all(np.isfinite(found.values)) else nominal
+
+
+def _best_track(train: Sequence[Record], start: Model) -> tuple[Track, State]:
+    """The bandwidth at which what is missing stands out most from the floor."""
+    best: tuple[float, Track, State] | None = None
+    step = max(record.sample_time for record in train)
+    allowed = [w for w in _BANDWIDTHS if w * step <= _FAST] or [_FAST / step]
+    for bandwidth in allowed:
+        track = Track.of(train, bandwidth, start)
+        if not track.runs:
+            raise DiagnosisError(train[0].source, "has no valid part of 200 samples", "record for longer")
+        state = refit(track, start)
+        quality = state.excess / max(state.floor, 1e-300)
+        if best is None or quality > best[0]:
+            best = (quality, track, state)
+    assert best is not None
+    return best[1], best[2]
+
+
+def _concluded(
+    train: Sequence[Record],
+    validation: Sequence[Record],
+    nominal: Model,
+    checks: Sequence[Check],
+    corrected: Sequence[str],
+    track: Track,
+    growth: Growth,
+) -> Diagnosis:
+    begin, end = growth.begin.fit.model, _with_errors(track, growth.end.fit)
+    held = _shown(validation, track, begin)
+    left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
+    if float(left["augmented"] @ left["augmented"]) > float(left["refit"] @ left["refit"]):
+        # What unseen recordings contradict isn't handed out, whatever the blocks said.
+        growth = replace(
+            growth,
+            end=growth.begin,
+            steps=(),
+            rejected=(*growth.rejected, *((s.term, "made the validation recording worse") for s in growth.steps)),
+        )
+        end, left["augmented"] = _with_errors(track, growth.begin.fit), left["refit"]
+    effort = held.joined([run.effort for run in held.runs])
+    spread = float(np.sum((effort - np.mean(effort)) ** 2))
+    floor = [held.residual(end, twin.efforts, twin.positions) for twin in twins(held, end, 3)]
+    noe = {name: 100.0 * float(each @ each) / spread for name, each in left.items()}
+    noise_floor = 100.0 * float(np.mean([each @ each for each in floor])) / spread
+    scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
+    missing = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
+    scales = scales_of(held)
+    findings = [_finding(validation, held, growth, end, step, scored, scales) for step in growth.steps]
+    rest = growth.end.excess / max(growth.begin.excess, 1e-300) if missing else 0.0
+    unknown = missing and (growth.end.excess > _MISMATCH * growth.end.floor) and (rest > _UNEXPLAINED or not findings)
+    unexplained = Unexplained(rest, None)
+    if missing and growth.end.excess > _MISMATCH * growth.end.floor:
+        where = _where_left(held, left["augmented"], floor, scales, end)
+        unexplained = Unexplained(rest, where)
+        if unknown:
+            findings = [_unknown(where, growth, scored, rest), *([] if rest > 0.6 else findings)]
+    return Diagnosis(
+        mismatch=missing,
+        checks=tuple(checks),
+        nominal=_nominal_part(nominal, growth.begin.fit),
+        findings=tuple(findings),
+        rejected=_rejected(growth, begin, scales_of(track)),
+        validation=scored,
+        unexplained=unexplained,
+        next_experiment=_next(findings, growth),
+        model=end,
+        refit=begin,
+        given=nominal,
+        prediction=tuple(_predictions(validation, held, left)),
+        notes=tuple(corrected),
+        bandwidth=held.bandwidth,
+        growth=growth,
+    )
+
+
+def _shown(validation: Sequence[Record], track: Track, begin: Model) -> Track:
+    """The validation recordings, followed as fast as what is missing still stands out from the floor."""
+    step = max(record.sample_time for record in validation)
+    for bandwidth in sorted({min(w, _FAST / step) for w in (*_BANDWIDTHS, track.bandwidth)}, reverse=True):
+        held = replace(Track.of(validation, bandwidth, begin), mass=track.mass)
+        if not held.runs:
+            raise DiagnosisError(validation[0].source, "has no valid part of 200 samples", "record for longer")
+        left = held.residual(begin)
+        floor = [held.residual(begin, twin.efforts, twin.positions) for twin in twins(held, begin, 2)]
+        if bandwidth <= track.bandwidth or float(left @ left) > 3.0 * float(np.mean([each @ each for each in floor])):
+            break
+    return held
+
+
+def _with_errors(track: Track, fit: Fit) -> Model:
+    """The fitted model with standard errors, residual correlation taken into account."""
+    covariance = sandwich_covariance(fit.jacobian, fit.residual, np.ones(fit.residual.shape[0]), track.starts)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) * fit.scale
+    known = {name: float(error) for name, error in zip(fit.names, errors, strict=True) if math.isfinite(error) and error > 0.0}
+    return replace(fit.model, standard_errors=known, provenance={"method": "diagnosis, fitted as a whole to what is missing"})
+
+
+def _nominal_part(nominal: Model, fit: Fit) -> NominalPart:
+    given = {p.name: p.value for p in nominal.parameters()}
+    found = {p.name: p.value for p in fit.model.parameters()}
+    off = {name: 100.0 * (given[name] - value) / value for name, value in found.items() if name in given and value != 0.0}
+    return NominalPart(given, found, off)
+
+
+def _finding(
+    validation: Sequence[Record], held: Track, growth: Growth, end: Model, step: Step, scored: Validation, scales: Scales
+) -> Finding:
+    place = list(end.prefixes).index(step.term)
+    effect = end.terms[place].effect
+    without = end.with_terms(term for k, term in enumerate(end.terms) if k != place)
+    fast = Track.of(validation, min(_LOCATING, _FAST / held.runs[0].step[0]), growth.begin.fit.model)
+    shown = growth.begin.fit.model if len(growth.steps) == 1 else without
+    change = fast.padded(fast.residual(shown)), fast.padded(fast.residual(end))
+    energy = []
+    for run, before, after in zip(fast.runs, *change, strict=True):
+        h = float(np.median(run.step))
+        energy.append(steady(moved_back(before - after, h, fast.bandwidth) ** 2, h))
+    where = locate(fast, energy, scales, end)
+    excess = max(growth.begin.excess, 1e-300)
+    share = min(max((step.before - step.after) / excess, 0.0), 1.0)
+    rival = next((each for each in step.rivals if each.effect.id != effect.id), None)
+    sure = confidence_of(growth, step)
+    parameters = {
+        p.name: Estimate(p.value, end.standard_errors.get(p.name), p.declaration.unit(end.units))
+        for p in end.parameters()
+        if p.name.startswith(f"{step.term}.")
+    }
+    runner = RunnerUp(rival.effect.id, round(min(1.0 - sure, sure), 4)) if rival is not None else None
+    beside = f"; the next best, {rival.effect.title}, {_percent(step.before - rival.left, excess)}" if rival is not None else ""
+    evidence = (
+        f"{effect.title} takes {_percent(step.before - step.after, excess)} of the missing force's energy away, on blocks of "
+        f"the recordings that its fit has not seen{beside}"
+    )
+    return Finding(
+        effect=effect.id,
+        law=effect.law,
+        title=effect.title,
+        confidence=sure,
+        runner_up=runner,
+        where=where,
+        component=place_of(effect),
+        share=share,
+        evidence=evidence,
+        parameters=parameters,
+        noe_before=scored.noe_refit,
+        noe_after=scored.noe_augmented,
+    )
+
+
+def _percent(part: float, whole: float) -> str:
+    return f"{100.0 * max(part, 0.0) / whole:.3g} %"
+
+
+def _where_left(held: Track, residual: Array, floor: Sequence[Array], scales: Scales, model: Model) -> Where:
+    """Where the rest sits: its energy above what twins leave at the same speed."""
+    level = float(np.mean([each @ each for each in floor])) / residual.shape[0]
+    energy = []
+    for run, part in zip(held.runs, held.padded(residual), strict=True):
+        h = float(np.median(run.step))
+        energy.append(np.maximum(steady(moved_back(part, h, held.bandwidth) ** 2, h) - 2.0 * level, 0.0))
+    return locate(held, energy, scales, model)
+
+
+def _unknown(where: Where, growth: Growth, scored: Validation, rest: float) -> Finding:
+    tried = sorted((s for s in growth.last), key=lambda each: each.left)
+    best = tried[0].column.term.effect if tried else None
+    beside = f"; the best of them, {best.title}, doesn't explain it" if best is not None else ""
+    return Finding(
+        effect="unknown",
+        law="",
+        title="something that no known effect explains",
+        confidence=unknown_confidence(growth, rest),
+        runner_up=RunnerUp(best.id, round(1.0 - unknown_confidence(growth, rest), 4)) if best is not None else None,
+        where=where,
+        component=_component_of(growth),
+        share=rest,
+        evidence=f"{100 * rest:.3g} % of the missing force's energy is left by every combination of known effects{beside}",
+        parameters={},
+        noe_before=scored.noe_refit,
+        noe_after=scored.noe_augmented,
+    )
+
+
+def _component_of(growth: Growth) -> str:
+    """The component whose effects come closest to the rest."""
+    tried = sorted(growth.last, key=lambda each: each.left)
+    return place_of(tried[0].column.term.effect) if tried else "not known"
+
+
+def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, ...]:
+    """Every effect that is not in the grown model, and why."""
+    there = {held.effect.id for held in growth.end.fit.model.terms}
+    found: dict[str, str] = dict(growth.rejected)
+    excess = max(growth.begin.excess, 1e-300)
+    first: Sequence[Tried] = growth.steps[0].screened if growth.steps else growth.last
+    for each in first:
+        name = each.column.term.effect.id
+        if name not in there and name not in found:
+            found[name] = f"takes {_percent(each.gain, excess)} away at first order where it was not fitted"
+    for step in growth.steps:
+        for rival in step.rivals:
+            if rival.effect.id not in there:
+                found[rival.effect.id] = (
+                    f"fitted in full it takes {_percent(step.before - rival.left, excess)} away, less than {step.term}"
+                )
+    offered = {candidate.effect.id for candidate in candidates(begin, scales)}
+    for effect in EFFECTS.values():
+        if effect.id in there or effect.id in found:
+            continue
+        found[effect.id] = (
+            "nothing in these recordings would show it"
+            if effect.id in offered
+            else "this plant, or the model's other terms, leave no room for it"
+        )
+    return tuple(Rejected(name, why) for name, why in found.items())
+
+
+def _next(findings: Sequence[Finding], growth: Growth) -> str:
+    for finding in findings:
+        effect: Effect | None = next((each for each in EFFECTS.values() if each.id == finding.effect), None)
+        if effect is not None and finding.runner_up is not None and finding.runner_up.effect in effect.looks_like:
+            return f"to tell {effect.id} from {finding.runner_up.effect}: {effect.looks_like[finding.runner_up.effect]}"
+        if finding.effect == "unknown":
+            return (
+                f"repeat the motion and vary one thing at a time where the mismatch sits ({finding.where.regime}): speed, place, "
+                "load, the rest before it"
+            )
+    if not findings:
+        return "none needed: what is left is what the instruments leave"
+    return "none needed to tell the cause from its rivals; a recording with other speeds and places would narrow its values"
+
+
+def _predictions(validation: Sequence[Record], held: Track, left: dict[str, Array]) -> list[Prediction]:
+    """Measured and predicted force of each validation recording at its samples."""
+    found = []
+    for number, record in enumerate(validation):
+        columns: dict[str, list[Array]] = {"time": [], "measured": [], "nominal": [], "refit": [], "augmented": []}
+        split = {name: held.split(each) for name, each in left.items()}
+        for k, run in enumerate(held.runs):
+            if held.record[k] != number:
+                continue
+            n = split["refit"][k].shape[0]
+            columns["time"].append(held.time[k][-n:])
+            columns["measured"].append(run.effort[-n:])
+            for name in left:
+                columns[name].append(run.effort[-n:] + split[name][k])
+        joined = {name: np.concatenate(parts) if parts else np.zeros(0) for name, parts in columns.items()}
+        found.append(
+            Prediction(
+                record.source, joined["time"], joined["measured"], joined["nominal"], joined["refit"], joined["augmented"]
+            )
+        )
+    return found

@@ -1,0 +1,252 @@
+"""What a diagnosis says: plain data, and the report that other programs read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..instrument import Finding as Check
+from ..model import Model
+from ..record import Array
+from .grow import Growth
+from .locate import Where
+
+__all__ = [
+    "Diagnosis",
+    "Estimate",
+    "Finding",
+    "NominalPart",
+    "Prediction",
+    "Rejected",
+    "RunnerUp",
+    "Unexplained",
+    "Validation",
+]
+
+FORMAT = "fric-report/1"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its standard error, None where it isn't known, and its unit."""
+
+    value: float
+    std: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class RunnerUp:
+    """The effect that comes closest to a finding, and its probability."""
+
+    effect: str
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is missing.
+
+    Attributes:
+        effect: id from the vocabulary, or ``unknown``.
+        law: which law fits, where an effect has several.
+        title: the effect in a sentence.
+        confidence: probability that it is this effect.
+        runner_up: the next best, or None.
+        where: when and in which regime.
+        component: part of the machine.
+        share: of the mismatch's energy.
+        evidence: one sentence.
+        parameters: of the effect, by name.
+        noe_before: NOE of the refitted nominal model on unseen recordings [%].
+        noe_after: NOE of the grown model on them [%].
+    """
+
+    effect: str
+    law: str
+    title: str
+    confidence: float
+    runner_up: RunnerUp | None
+    where: Where
+    component: str
+    share: float
+    evidence: str
+    parameters: Mapping[str, Estimate]
+    noe_before: float
+    noe_after: float
+
+
+@dataclass(frozen=True)
+class NominalPart:
+    """Values of the nominal model as given and as refitted, and how far the given ones were off [%]."""
+
+    parameters: Mapping[str, float]
+    refit_parameters: Mapping[str, float]
+    parameter_error_percent: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """An effect that isn't there, and why."""
+
+    effect: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Validation:
+    """NOE on recordings that no fit and no choice has seen [%], and what noise alone leaves."""
+
+    noe_nominal: float
+    noe_refit: float
+    noe_augmented: float
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Share of the mismatch's energy that is left, and where it sits; None when it isn't above the floor."""
+
+    share: float
+    where: Where | None
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Forces of one validation recording, arrays of shape ``(n,)`` [F] over ``time`` [s]."""
+
+    source: str
+    time: Array
+    force_measured: Array
+    force_nominal: Array
+    force_refit: Array
+    force_augmented: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The whole verdict.
+
+    Attributes:
+        mismatch: True when something is missing in the nominal model.
+        checks: of the instrument.
+        nominal: its values, given and refitted.
+        findings: what is missing, what explains most first.
+        rejected: the other effects, with reasons.
+        validation: NOE on unseen recordings.
+        unexplained: what is left.
+        next_experiment: what to record next.
+        model: the grown model.
+        refit: the refitted nominal model.
+        given: the nominal model as it came.
+        prediction: forces of each validation recording.
+        notes: what was corrected or left out before.
+        bandwidth: of the observer that tells the missing force [rad/s].
+        growth: how the model grew, for the report.
+    """
+
+    mismatch: bool
+    checks: tuple[Check, ...]
+    nominal: NominalPart
+    findings: tuple[Finding, ...]
+    rejected: tuple[Rejected, ...]
+    validation: Validation
+    unexplained: Unexplained
+    next_experiment: str
+    model: Model
+    refit: Model
+    given: Model
+    prediction: tuple[Prediction, ...]
+    notes: tuple[str, ...]
+    bandwidth: float
+    growth: Growth
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence."""
+        v = self.validation
+        if not self.mismatch:
+            return (
+                f"Nothing is missing: the refitted model leaves an NOE of {v.noe_refit:.3g} %, and the instruments alone leave "
+                f"{v.noise_floor:.3g} %."
+            )
+        first = self.findings[0] if self.findings else None
+        if first is None or first.effect == "unknown":
+            where = first.where.regime if first is not None else "not located"
+            return f"Something is missing, and no known effect explains it; it sits here: {where}."
+        names = " and ".join(
+            f"{each.title} ({100 * each.confidence:.0f} % sure)" for each in self.findings if each.effect != "unknown"
+        )
+        return f"Missing: {names}; with it the NOE on unseen data falls from {v.noe_refit:.3g} % to {v.noe_augmented:.3g} %."
+
+    def report(self) -> dict[str, Any]:
+        """The contents of ``report.json``; numbers that aren't finite become null."""
+        report = {
+            "format": FORMAT,
+            "verdict": self.sentence,
+            "mismatch": self.mismatch,
+            "checks": [
+                {"check": c.check, "verdict": c.verdict, "value": c.value, "detail": c.detail, "remedy": c.remedy}
+                for c in self.checks
+            ],
+            "nominal": {
+                "parameters": dict(self.nominal.parameters),
+                "refit_parameters": dict(self.nominal.refit_parameters),
+                "parameter_error_percent": dict(self.nominal.parameter_error_percent),
+            },
+            "findings": [_finding(each) for each in self.findings],
+            "rejected": [{"effect": each.effect, "why": each.why} for each in self.rejected],
+            "validation": {
+                "noe_nominal": self.validation.noe_nominal,
+                "noe_refit": self.validation.noe_refit,
+                "noe_augmented": self.validation.noe_augmented,
+                "noise_floor": self.validation.noise_floor,
+            },
+            "unexplained": {"share": self.unexplained.share, "where": _where(self.unexplained.where)},
+            "next_experiment": self.next_experiment,
+            "notes": list(self.notes),
+        }
+        found: dict[str, Any] = _finite(report)
+        return found
+
+
+def _where(where: Where | None) -> dict[str, Any]:
+    if where is None:
+        return {"time": [], "regime": ""}
+    first = where.time[0] if where.time else ()
+    return {
+        "time": [list(span) for span in first],
+        "time_by_recording": [[list(span) for span in spans] for spans in where.time],
+        "regime": where.regime,
+        "quantity": where.quantity,
+        "range": list(where.range),
+        "share_in_time": where.share,
+    }
+
+
+def _finding(each: Finding) -> dict[str, Any]:
+    return {
+        "effect": each.effect,
+        "law": each.law,
+        "confidence": each.confidence,
+        "runner_up": None
+        if each.runner_up is None
+        else {"effect": each.runner_up.effect, "confidence": each.runner_up.confidence},
+        "where": {**_where(each.where), "component": each.component, "share_of_mismatch": each.share},
+        "evidence": each.evidence,
+        "parameters": {name: {"value": e.value, "std": e.std, "unit": e.unit} for name, e in each.parameters.items()},
+        "noe_before": each.noe_before,
+        "noe_after": each.noe_after,
+    }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(held) for key, held in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(held) for held in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,136 @@
+"""End stop: the joint stands at one end of its travel although the force pushes outward harder than it has to anywhere else.
+
+Harder than the force that moved it outward anywhere, less inertia, the moments before it broke away included, and than the
+spring that the rest of the recording shows would explain. A joint that was brought to rest there by its controller, or is
+held against a spring, is at no stop: it must have been stopped abruptly, or take a force that changes without giving way. The
+value is the time spent at stops.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import binary_dilation
+
+from ..record import Array, Mask
+from .check import Check, Evidence, Finding, each
+from .view import View, friction_along, runs
+
+__all__ = ["CHECK", "Stop", "stops"]
+
+_SHORTEST = 0.05  # [s]
+_SLOPE_TIME = 0.05  # [s] over which speed is taken: slow enough for encoder steps, fast enough to see the stop
+_BREAK_AWAY = 0.05  # [s] before motion that still belong to it
+_STANDS = 0.02  # of the high speed
+_NEAR = 0.002  # of the travel
+_HARDER = 0.1  # of the force range
+_CHANGES = 0.3  # of the force range, within a stand
+_ABRUPT = 0.15  # of the high speed, lost within a few samples before a stand
+
+
+class Stop(NamedTuple):
+    """A stand at an end stop: first sample, the one after the last, where [x], ``lowest`` or ``highest``, and the push [F]."""
+
+    first: int
+    last: int
+    position: float
+    end: str
+    push: float
+
+
+def _speed(position: Array, time: Array, step: float, width_time: float) -> Array:
+    width = max(round(width_time / step), 1)
+    velocity = np.zeros_like(position)
+    if position.shape[0] > 2 * width:
+        velocity[width:-width] = (position[2 * width :] - position[: -2 * width]) / (time[2 * width :] - time[: -2 * width])
+    return velocity
+
+
+def _spring(position: Array, effort: Array, away: Mask) -> Array:
+    """The force of a spring, as the motion away from the ends shows it, ``(n,)``; zero where there is none."""
+    if np.sum(away) < 40:
+        return np.zeros_like(position)
+    q, u = position[away], effort[away]
+    middle = float(np.mean(q))
+    slope = float(np.sum((q - middle) * (u - np.mean(u)))) / max(float(np.sum((q - middle) ** 2)), 1e-300)
+    explained = slope**2 * float(np.var(q)) / max(float(np.var(u)), 1e-300)
+    return slope * (position - middle) if slope > 0.0 and explained > 0.3 else np.zeros_like(position)
+
+
+def _inertial(view: View) -> tuple[float, Array]:
+    """Sign that the effort should have, and what of it accelerates the axis, as far as that is known, ``(n_samples,)`` [F]."""
+    friction, error, _ = friction_along(view)
+    mass, mass_error = view.balance.value("mass"), view.balance.error("mass")
+    side = -1.0 if friction < -4.0 * error and mass < 0.0 else 1.0
+    if not side * mass > 4.0 * mass_error:
+        return side, np.zeros(view.record.n_samples)
+    grid = np.arange(view.n) * view.h
+    return side, np.asarray(side * mass * np.interp(view.record.time, grid, view.acceleration))
+
+
+def stops(view: View) -> list[Stop]:
+    """Where the joint of ``view`` stands at a stop."""
+    record = view.record
+    position, time = record.position, record.time
+    side, inertial = _inertial(view)
+    effort = side * record.effort
+    travel, spread = float(np.ptp(position)), float(np.ptp(effort))
+    if travel == 0.0 or spread == 0.0 or not view.moves:
+        return []
+    step = record.sample_time
+    velocity = _speed(position, time, step, _SLOPE_TIME)
+    quick = _speed(position, time, step, 0.2 * _SLOPE_TIME)
+    high = float(np.quantile(np.abs(velocity), 0.98))
+    limit = _STANDS * high
+    near = max(_NEAR * travel, 1.5 * view.resolution)
+    slow = np.abs(velocity) <= max(limit, 1.5 * view.resolution / _SLOPE_TIME)
+    found = []
+    for outward, end, name in ((-1.0, float(np.min(position)), "lowest"), (1.0, float(np.max(position)), "highest")):
+        there = np.abs(position - end) < near
+        moving = velocity * outward > limit
+        if not np.any(moving):
+            continue
+        # The moments before it moves are when it breaks away, and may take the most.
+        width = max(round(_BREAK_AWAY / step), 1)
+        moving = binary_dilation(moving, structure=np.arange(2 * width + 1) <= width) & ~there
+        push = outward * (effort - _spring(position, effort, moving))
+        if not np.any(moving):
+            continue
+        needed = float(np.quantile((push - outward * inertial)[moving], 0.995)) + _HARDER * spread
+        for first, last in runs(there & slow):
+            most = float(np.max(push[first:last]))
+            if time[last - 1] - time[first] < _SHORTEST or most < needed:
+                continue
+            before = slice(max(first - round(2.0 * _SLOPE_TIME / step), 0), first + 1)
+            abrupt = float(np.max(outward * quick[before])) > _ABRUPT * high and _hard(outward * quick, before, high)
+            changes = float(np.ptp(effort[first:last])) > _CHANGES * spread
+            if abrupt or changes:
+                found.append(Stop(first, last, end, name, side * outward * float(np.max(outward * effort[first:last]))))
+    return found
+
+
+def _hard(speed: Array, before: slice, high: float) -> bool:
+    """Whether the speed falls from much to next to nothing within a fifth of the time that is looked at."""
+    part = speed[before]
+    width = max(part.shape[0] // 5, 2)
+    return bool(np.any(part[:-width] - part[width:] > _ABRUPT * high)) if part.shape[0] > width else False
+
+
+def _judge(view: View, evidence: Evidence) -> Finding:
+    if not view.moves:
+        return Finding("end_stop", "unknown", "it does not move")
+    found = stops(view)
+    if not found:
+        return Finding("end_stop", "ok", "it stands nowhere against a push that would move it elsewhere", 0.0, "s")
+    time, units = view.record.time, view.record.units
+    spans = tuple((float(time[stop.first]), float(time[stop.last - 1])) for stop in found)
+    total = sum(b - a for a, b in spans)
+    places = ", ".join(f"{stop.position:.4g}" for stop in {stop.end: stop for stop in found}.values())
+    push = f"{found[0].push:+.3g} {units.force}"
+    detail = f"it stands at {places} {units.position} for {total:.3g} s while the force pushes on, up to {push}"
+    remedy = "stay away from the end stops (less travel, another starting point); these parts are left out of a fit"
+    return Finding("end_stop", "fault", detail, total, "s", remedy=remedy, time=spans)
+
+
+CHECK = Check("end_stop", "end stops", "motion", each(_judge))

@@ -1,0 +1,216 @@
+"""Lag of the effort against the motion, constant and growing, from the force balance alone.
+
+The effort, shifted by tau, is fitted by what a motion needs: m a + k q + b and, for each direction, a constant, a viscous part
+and one that fades with speed. The tau that leaves least is the lag. Only sliding samples count, so that pre-sliding and play
+after a reversal, which lag behind by themselves, stay out. The sums are kept per window, so that a lag that grows, and
+intervals by the jackknife over windows, need no second pass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..record import Array, Index
+
+if TYPE_CHECKING:
+    from .view import View
+
+__all__ = ["Growth", "Lag", "LagCurves", "judged"]
+
+_WINDOWS = 16
+_RANGE = 0.1  # [s]
+_LEAST_RANGE = 6  # steps of the grid
+_MOST_RANGE = 80
+_SPAN = 0.1  # [s] longest growth over a recording that is looked for
+_CONTRAST = 6.0  # energy at a typical shift over the least
+_INERTIA = 3.0  # rms of the inertial force over the residual's, at least
+_PER_BAND = 10.0  # steps of the grid per period of the cutoff
+
+
+@dataclass(frozen=True)
+class Lag:
+    """A constant lag.
+
+    Attributes:
+        value: [s].
+        error: standard error [s].
+        left: share of the residual's energy that it leaves.
+        at_edge: whether it lies at the edge of what was looked for.
+        residual: rms [F].
+        contrast: energy at a typical shift over the least.
+        inertia: rms of the inertial force at this lag over the residual's.
+    """
+
+    value: float
+    error: float
+    left: float
+    at_edge: bool
+    residual: float
+    contrast: float
+    inertia: float
+
+
+@dataclass(frozen=True)
+class Growth:
+    """A lag that grows.
+
+    Attributes:
+        value: growth [s/s].
+        error: its standard error [s/s].
+        start: lag at the start of the recording [s].
+        left: share of the energy after a constant lag that it leaves.
+        inertia: rms of the inertial force over the residual's.
+    """
+
+    value: float
+    error: float
+    start: float
+    left: float
+    inertia: float
+
+
+class LagCurves:
+    """Sums for every window and every shift.
+
+    Args:
+        view: the recording.
+    """
+
+    def __init__(self, view: View) -> None:
+        thin = max(int(1.0 / (view.h * _PER_BAND * view.cutoff)), 1)
+        self.step = thin * view.h
+        reach = int(np.clip(np.ceil(_RANGE / self.step), _LEAST_RANGE, _MOST_RANGE))
+        shifts = np.arange(-reach, reach + 1)
+        self.tau: Array = np.asarray(shifts * self.step, dtype=np.float64)
+        at = np.arange(0, view.n, thin, dtype=np.int64)
+        effort = view.effort[at]
+        usable = view.usable[at]
+        keep = np.flatnonzero(view.sliding[at])
+        keep = keep[(keep >= reach) & (keep < at.size - reach)]
+        keep = keep[np.all(usable[np.clip(keep[:, None] + np.array([-reach, reach]), 0, at.size - 1)], axis=1)]
+        columns = _columns(view, at[keep])
+        self.columns = columns
+        bounds = np.linspace(0, keep.size, _WINDOWS + 1).astype(np.int64)
+        self.enough = keep.size > 8 * columns.shape[1] + 10 * _WINDOWS
+        self.n_samples = int(keep.size)
+        if not self.enough:
+            return
+        self.time = np.array([float(np.mean(at[keep[a:b]])) * view.h for a, b in pairwise(bounds.tolist())])
+        xx, xu, uu = [], [], []
+        for first, last in pairwise(bounds.tolist()):
+            x = columns[first:last]
+            u = effort[keep[first:last, None] + shifts]
+            xx.append(x.T @ x)
+            xu.append(x.T @ u)
+            uu.append(np.sum(u**2, axis=0))
+        self.xx, self.xu, self.uu = np.array(xx), np.array(xu), np.array(uu)
+
+    def _least(self, keep: Array) -> tuple[float, Array]:
+        """Best constant shift with the windows weighted by ``keep``, and the curve of the residual's energy."""
+        xx, xu, uu = (np.tensordot(keep, each, axes=1) for each in (self.xx, self.xu, self.uu))
+        curve = uu - np.sum(xu * (np.linalg.pinv(xx, rcond=1e-9, hermitian=True) @ xu), axis=0)
+        return _minimum(self.tau, curve), curve
+
+    @lru_cache(maxsize=1)  # noqa: B019 - the curves live as long as their view, and so may what follows from them
+    def constant(self) -> Lag:
+        """The lag of the whole recording."""
+        ones = np.ones(_WINDOWS)
+        best, curve = self._least(ones)
+        others = np.array([self._least(ones - np.eye(_WINDOWS)[w])[0] for w in range(_WINDOWS)])
+        error = float(np.sqrt((_WINDOWS - 1) / _WINDOWS * np.sum((others - np.mean(others)) ** 2)))
+        zero = float(np.interp(0.0, self.tau, curve))
+        lowest = float(np.min(curve))
+        at_edge = abs(best) > self.tau[-1] - 1.5 * self.step
+        residual = float(np.sqrt(max(lowest, 0.0) / self.n_samples))
+        k = int(np.argmin(curve))
+        values = np.linalg.pinv(self.xx.sum(axis=0), rcond=1e-9, hermitian=True) @ self.xu.sum(axis=0)[:, k]
+        contrast = float(np.median(curve)) / max(lowest, 1e-300)
+        return Lag(
+            best, error, lowest / max(zero, 1e-300), at_edge, residual, contrast, float(values[0]) / max(residual, 1e-300)
+        )
+
+    @lru_cache(maxsize=1)  # noqa: B019 - as above
+    def growing(self) -> Growth:
+        """A lag tau + s t."""
+        best, curve = self._least(np.ones(_WINDOWS))
+        middle = self.time - float(np.mean(self.time))
+        slopes = np.linspace(-1.0, 1.0, 97) * _SPAN / float(np.ptp(self.time))
+        # A lag that grows much can throw the best constant one far off; then it is near zero that there is a better start.
+        near = np.linspace(-8.0, 8.0, 33) * self.step
+        offsets = np.concatenate([best + near, near])
+        n = slopes.shape[0] * offsets.shape[0]
+        xu, uu = np.empty((_WINDOWS, self.xx.shape[1], n)), np.empty((_WINDOWS, n))
+        for w, t in enumerate(middle):
+            at = np.clip((offsets[None, :] + slopes[:, None] * t).ravel(), self.tau[0], self.tau[-1])
+            left = np.minimum(((at - self.tau[0]) / self.step).astype(np.int64), self.tau.shape[0] - 2)
+            share = (at - self.tau[left]) / self.step
+            xu[w] = self.xu[w][:, left] * (1.0 - share) + self.xu[w][:, left + 1] * share
+            uu[w] = self.uu[w][left] * (1.0 - share) + self.uu[w][left + 1] * share
+        all_xx, all_xu, all_uu = self.xx.sum(axis=0), xu.sum(axis=0), uu.sum(axis=0)
+
+        def fit(without: int | None) -> tuple[float, float, float, float]:
+            xx = all_xx if without is None else all_xx - self.xx[without]
+            x = all_xu if without is None else all_xu - xu[without]
+            u = all_uu if without is None else all_uu - uu[without]
+            energy = u - np.sum(x * (np.linalg.pinv(xx, rcond=1e-9, hermitian=True) @ x), axis=0)
+            table = energy.reshape(slopes.shape[0], offsets.shape[0])
+            row, column = np.unravel_index(int(np.argmin(table)), table.shape)
+            k = int(row) * offsets.shape[0] + int(column)
+            inertia = float((np.linalg.pinv(xx, rcond=1e-9, hermitian=True) @ x[:, k])[0])
+            return float(offsets[column]), _minimum(slopes, table[:, column]), float(table[row, column]), inertia
+
+        offset, slope, energy, inertia = fit(None)
+        others = np.array([fit(w)[1] for w in range(_WINDOWS)])
+        error = float(np.sqrt((_WINDOWS - 1) / _WINDOWS * np.sum((others - np.mean(others)) ** 2)))
+        # A tenth of the grid's own step can't be told from none.
+        error = max(error, 0.1 * float(slopes[1] - slopes[0]))
+        start = offset - slope * float(np.mean(self.time))
+        left = energy / max(float(np.min(curve)), 1e-300)
+        return Growth(slope, error, start, left, inertia / max(float(np.sqrt(max(energy, 0.0) / self.n_samples)), 1e-300))
+
+
+def judged(view: View, growing: bool = False) -> tuple[LagCurves | None, str]:
+    """The curves of ``view``, or None and why a lag, constant or growing, can't be seen in it."""
+    if not view.moves:
+        return None, "it does not move"
+    curves = view.lags
+    if not curves.enough:
+        return None, "too few sliding samples"
+    if growing:
+        found: Lag | Growth = curves.growing()
+        sharp = True
+    else:
+        found = curves.constant()
+        sharp = found.contrast > _CONTRAST
+    if not (found.inertia > _INERTIA and sharp):
+        return None, "the motion has too little acceleration: a lag would change next to nothing"
+    return curves, ""
+
+
+def _columns(view: View, at: Index) -> Array:
+    """What a motion needs, one column each, scaled to rms 1."""
+    q, v = view.position[at], view.velocity[at]
+    fading = 1.0 / (1.0 + np.abs(v) / max(0.1 * view.speed, 1e-300))
+    middle = float(np.mean(q)) if q.size else 0.0
+    forward, backward = (v > 0.0) * 1.0, (v < 0.0) * 1.0
+    columns = np.column_stack(
+        [view.acceleration[at], q - middle, forward, forward * v, forward * fading, backward, backward * v, backward * fading]
+    )
+    size = np.sqrt(np.mean(columns**2, axis=0)) if at.size else np.ones(columns.shape[1])
+    size[size == 0.0] = 1.0
+    return np.asarray(columns / size)
+
+
+def _minimum(x: Array, y: Array) -> float:
+    """Where ``y`` is least, by the parabola through three points."""
+    k = int(np.argmin(y))
+    if k in {0, x.shape[0] - 1}:
+        return float(x[k])
+    low, mid, high = y[k - 1], y[k], y[k + 1]
+    bend = low - 2.0 * mid + high
+    return float(x[k] + (0.5 * (low - high) / bend if bend > 0.0 else 0.0) * (x[1] - x[0]))

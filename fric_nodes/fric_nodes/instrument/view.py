@@ -1,0 +1,294 @@
+"""A recording as the checks see it: on an even grid, filtered, differentiated, with its noise, its steps and its rests known.
+
+The filter is a zero-phase Butterworth low-pass as wide as the position's noise allows: acceleration noise stays below a
+twentieth of the acceleration, where that can be reached. White noise of s on the position gives s (2 pi)^2 B^2.5 sqrt(2 h /
+5) on the acceleration after a filter to B [Hz].
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy import signal
+
+from ..record import Array, Index, Mask, Record
+from .lag import LagCurves
+
+__all__ = ["Balance", "View", "friction_along", "imbalance", "resolution_of", "runs"]
+
+_ORDER = 4
+_WIDEST = 100.0  # [Hz]
+_NARROWING = 1.5
+_ACCELERATION_NOISE = 0.05
+_RARER = 0.05  # share of the sliding samples, at least, in the rarer direction
+_SLIDING = 0.05  # of the recording's high speed
+_AFTER_REVERSAL = 0.03  # of a typical stroke: pre-sliding, and what a play takes
+
+
+class Balance(NamedTuple):
+    """Force balance of the sliding samples, u = m a + F sgn v + c v + b + k (q - q_mean); NaN where it can't be made.
+
+    Attributes:
+        names: ``mass``, ``coulomb``, ``viscous``, ``bias``, ``stiffness``.
+        values: shape ``(5,)``.
+        errors: standard errors, residual correlation counted, shape ``(5,)``.
+        residual: rms [F].
+        parts: rms of the force of each, shape ``(5,)`` [F].
+        n_samples: that it was made from.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    errors: Array
+    residual: float
+    parts: Array
+    n_samples: int
+
+    def value(self, name: str) -> float:
+        """The value of ``name``."""
+        return float(self.values[self.names.index(name)])
+
+    def error(self, name: str) -> float:
+        """The standard error of ``name``."""
+        return float(self.errors[self.names.index(name)])
+
+    def part(self, name: str) -> float:
+        """The rms force of ``name`` [F]."""
+        return float(self.parts[self.names.index(name)])
+
+
+_NAMES = ("mass", "coulomb", "viscous", "bias", "stiffness")
+
+
+class View:
+    """What the checks look at of one recording; everything is computed when it is first asked for.
+
+    Args:
+        record: as it was read.
+    """
+
+    def __init__(self, record: Record) -> None:
+        self.record = record
+        self.even = record.uniform()
+        self.h = self.even.sample_time
+        self.n = self.even.n_samples
+
+    @cached_property
+    def force(self) -> Array:
+        """Force at the samples' own instants, as recorded [F], shape ``(n,)``."""
+        effort = self.even.effort
+        before, after = np.concatenate([effort[:1], effort[:-1]]), np.concatenate([effort[1:], effort[-1:]])
+        other = {"following": before, "preceding": after, "linear": effort}[self.even.effort_hold]
+        return np.asarray(0.5 * (effort + other))
+
+    @cached_property
+    def travel(self) -> float:
+        """From the lowest to the highest position [x]."""
+        return float(np.ptp(self.even.position))
+
+    @cached_property
+    def resolution(self) -> float:
+        """Step of the position sensor [x]; 0 when none shows."""
+        return resolution_of(self.record.position)
+
+    @cached_property
+    def effort_resolution(self) -> float:
+        """Step of the effort [F]; 0 when none shows."""
+        return resolution_of(self.record.effort)
+
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of the position signal, steps included [x]."""
+        bend = np.abs(np.diff(self.even.position, 2))
+        random = 1.4826 * float(np.median(bend)) / np.sqrt(6.0) if bend.size else 0.0
+        rounding = 1e-14 * float(np.max(np.abs(self.even.position)))
+        return float(np.hypot(random, self.resolution / np.sqrt(12.0))) + rounding
+
+    def low_pass(self, values: Array, cutoff: float | None = None) -> Array:
+        """``values``, shape ``(n,)``, through the filter of the view, or to another ``cutoff`` [Hz]."""
+        cutoff = self.cutoff if cutoff is None else cutoff
+        sos = signal.butter(_ORDER, min(2.0 * cutoff * self.h, 0.99), output="sos")
+        padding = min(values.shape[0] - 1, 3 * (2 * sos.shape[0] + 1))
+        return np.asarray(signal.sosfiltfilt(sos, values, padlen=padding))
+
+    @cached_property
+    def cutoff(self) -> float:
+        """Of the filter [Hz]."""
+        cutoff = min(_WIDEST, 0.25 / self.h)
+        lowest = min(max(10.0 / (self.n * self.h), 0.5), cutoff)
+        while cutoff > lowest:
+            smooth = self.low_pass(self.even.position, cutoff)
+            acceleration = np.gradient(np.gradient(smooth, self.h), self.h)
+            noise = self.noise * (2.0 * np.pi) ** 2 * cutoff**2.5 * np.sqrt(0.4 * self.h)
+            if noise <= _ACCELERATION_NOISE * float(np.sqrt(np.mean(acceleration**2))):
+                break
+            cutoff /= _NARROWING
+        return max(cutoff, lowest)
+
+    @cached_property
+    def position(self) -> Array:
+        """Filtered [x], shape ``(n,)``."""
+        return self.low_pass(self.even.position)
+
+    @cached_property
+    def velocity(self) -> Array:
+        """Of the filtered position [x/s], shape ``(n,)``."""
+        return np.asarray(np.gradient(self.position, self.h))
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """Of the filtered position [x/s^2], shape ``(n,)``."""
+        return np.asarray(np.gradient(self.velocity, self.h))
+
+    @cached_property
+    def effort(self) -> Array:
+        """Force at the samples' own instants, filtered as the position [F], shape ``(n,)``."""
+        return self.low_pass(self.force)
+
+    @cached_property
+    def usable(self) -> Mask:
+        """Valid samples away from the ends, which the filter spoils."""
+        good = self.even.mask.copy()
+        edge = min(int(np.ceil(1.0 / (self.cutoff * self.h))), self.n // 4)
+        good[:edge] = False
+        good[self.n - edge :] = False
+        return good
+
+    @cached_property
+    def velocity_noise(self) -> float:
+        """Standard deviation of the filtered velocity at rest [x/s]."""
+        return float(self.noise * 2.0 * np.pi * self.cutoff**1.5 * np.sqrt(2.0 / 3.0 * self.h))
+
+    @cached_property
+    def speed(self) -> float:
+        """High speed of the recording, the 98 % quantile [x/s]."""
+        return float(np.quantile(np.abs(self.velocity), 0.98))
+
+    @cached_property
+    def moving(self) -> Mask:
+        """Where it moves by more than noise would show, shape ``(n,)``."""
+        return np.asarray(np.abs(self.velocity) > max(_SLIDING * self.speed, 5.0 * self.velocity_noise, 1e-300))
+
+    @cached_property
+    def moves(self) -> bool:
+        """Whether it moves at all."""
+        least = 4.0 * max(self.resolution, 3.0 * self.noise)
+        return self.travel > least and float(np.mean(self.moving & self.usable)) > 0.01
+
+    @cached_property
+    def reversals(self) -> Index:
+        """First samples of motion in another direction than the motion before."""
+        at = np.flatnonzero(self.moving)
+        sign = np.sign(self.velocity[at])
+        return np.asarray(at[1:][sign[1:] != sign[:-1]], dtype=np.int64)
+
+    @cached_property
+    def strokes(self) -> Array:
+        """Distances between reversals [x]."""
+        ends = np.concatenate([[0], self.reversals, [self.n - 1]])
+        return np.asarray(np.abs(np.diff(self.position[ends])))
+
+    @cached_property
+    def sliding(self) -> Mask:
+        """Where it slides: moving, usable, and some way after the last reversal or rest."""
+        way = np.zeros(self.n)
+        distance = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self.position)))])
+        starts = np.flatnonzero(self.moving & ~np.concatenate([[False], self.moving[:-1]]))
+        starts = np.union1d(starts, self.reversals)
+        if starts.size:
+            last = np.searchsorted(starts, np.arange(self.n), side="right") - 1
+            way = np.where(last >= 0, distance - distance[starts[np.maximum(last, 0)]], 0.0)
+        stroke = float(np.quantile(self.strokes, 0.75))
+        return np.asarray(self.moving & self.usable & (way > _AFTER_REVERSAL * stroke))
+
+    @cached_property
+    def lags(self) -> LagCurves:
+        """Lag of the effort against the motion."""
+        return LagCurves(self)
+
+    @cached_property
+    def balance(self) -> Balance:
+        """Force balance of the sliding samples."""
+        return balance_on(self, np.flatnonzero(self.sliding))
+
+
+def balance_on(view: View, at: Index) -> Balance:
+    """Force balance of the samples ``at``."""
+    if at.size < 40:
+        nothing = np.full(5, np.nan)
+        return Balance(_NAMES, nothing, nothing, float("nan"), nothing, int(at.size))
+    columns = _columns(view, at)
+    size = np.sqrt(np.mean(columns**2, axis=0))
+    size[size == 0.0] = 1.0
+    scaled = columns / size
+    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10, hermitian=True)
+    values = inverse @ (scaled.T @ view.effort[at])
+    residual = view.effort[at] - scaled @ values
+    # Clusters as long as the slowest thing in the residual can be: a twentieth of the recording.
+    cluster = at * 20 // view.n
+    score = np.zeros((20, 5))
+    np.add.at(score, cluster, scaled * residual[:, None])
+    errors = np.sqrt(np.maximum(np.diag(inverse @ (score.T @ score) @ inverse), 0.0))
+    rms = float(np.sqrt(np.mean(residual**2)))
+    return Balance(_NAMES, values / size, errors / size, rms, np.abs(values), int(at.size))
+
+
+def _columns(view: View, at: Index) -> Array:
+    """Acceleration, direction, velocity, one, and position from the middle of the sliding, shape ``(n, 5)``."""
+    q = view.position[at] - float(np.mean(view.position[view.sliding]))
+    v = view.velocity[at]
+    return np.column_stack([view.acceleration[at], np.sign(v), v, np.ones(at.size), q])
+
+
+def imbalance(view: View, without: Mask) -> Array:
+    """Effort that the balance made without some samples leaves unexplained, where it slides; NaN elsewhere, ``(n,)`` [F]."""
+    found = balance_on(view, np.flatnonzero(view.sliding & ~without))
+    left = np.full(view.n, np.nan)
+    at = np.flatnonzero(view.sliding)
+    if np.all(np.isfinite(found.values)):
+        left[at] = view.effort[at] - _columns(view, at) @ found.values
+    return left
+
+
+def friction_along(view: View) -> tuple[float, float, float]:
+    """Friction of the sliding axis along its motion [F], its standard error, and the median sliding speed [x/s].
+
+    What the effort does along the motion, without what inertia, a spring and a constant force take: positive when energy is
+    lost. NaN where it isn't known: in one direction alone friction is no different from gravity.
+    """
+    found = view.balance
+    if not np.all(np.isfinite(found.values)):
+        return float("nan"), float("nan"), float("nan")
+    at = np.flatnonzero(view.sliding)
+    q, v = view.position[at] - float(np.mean(view.position[at])), view.velocity[at]
+    if not _RARER < float(np.mean(v > 0.0)) < 1.0 - _RARER:
+        return float("nan"), float("nan"), float("nan")
+    other = found.value("mass") * view.acceleration[at] + found.value("bias") + found.value("stiffness") * q
+    along = np.sign(v) * (view.effort[at] - other)
+    block = at * 20 // view.n
+    count = np.bincount(block, minlength=20)
+    mean = float(np.mean(along))
+    off = np.bincount(block, weights=along - mean, minlength=20)
+    error = float(np.sqrt(np.sum(off[count > 0] ** 2))) / at.size
+    return mean, error, float(np.median(np.abs(v)))
+
+
+def resolution_of(values: Array) -> float:
+    """The step that ``values`` are whole multiples of apart; 0 when there is none."""
+    gaps = np.diff(np.unique(values))
+    # What is left of rounding is no step.
+    gaps = gaps[gaps > 1e-9 * max(float(np.ptp(values)), 1e-300)]
+    if gaps.size == 0:
+        return 0.0
+    least = float(np.min(gaps))
+    step = float(np.median(gaps[gaps < 1.2 * least]))
+    whole = gaps[gaps < 200.0 * step] / step
+    return step if float(np.mean(np.abs(whole - np.round(whole)) < 0.05)) > 0.95 else 0.0
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """First sample, and sample after the last, of every run of True."""
+    bounds = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return list(zip(bounds[::2].tolist(), bounds[1::2].tolist(), strict=True))

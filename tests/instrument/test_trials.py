@@ -1,0 +1,24 @@
+"""A few of the recordings of ``fric bench instrument``, by other seeds."""
+
+from __future__ import annotations
+
+import pytest
+from fric_nodes.instrument import CHECKS, Evidence
+from fric_nodes.instrument.trials.faults import FAULTS, Fault
+from fric_nodes.instrument.trials.score import false_alarms
+
+
+def test_every_check_that_a_recording_alone_can_fail_has_a_fault() -> None:
+    assert set(CHECKS) - {fault.check for fault in FAULTS} == {"sensor_side"}
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_the_fault_is_found(fault: Fault) -> None:
+    trial = fault.make(404)
+    findings = CHECKS[fault.check].run(Evidence(trial.records, trial.model))
+    assert any(finding.verdict in fault.verdicts for finding in findings), findings
+
+
+def test_clean_recordings_raise_no_alarm() -> None:
+    wrong, _ = false_alarms(range(30_000, 30_012))
+    assert [(seed, finding.check, finding.detail) for seed, finding in wrong] == []
