@@ -19,13 +19,12 @@ _MOST = 0.995
 
 def features(growth: Growth, step: Step) -> tuple[float, float]:
     """Logarithm of what the best rival leaves over what the effect leaves, and the share that nothing explains."""
-    floor, excess = growth.begin.floor, max(growth.begin.excess, 1e-300)
-    slack = 0.15 * floor + 0.01 * excess
+    slack = 0.15 * step.floor + 0.01 * step.missing
     effect_id = step.term.split("#")[0]
-    others = [each.left for each in step.rivals if each.effect.id != effect_id]
+    others = [each.left for each in step.rivals if effect_id not in {name.split("#")[0] for name in each.names}]
     rival = min(others, default=step.before)
-    margin = math.log((max(rival - floor, 0.0) + slack) / (max(step.after - floor, 0.0) + slack))
-    return margin, growth.end.excess / excess
+    margin = math.log((max(rival - step.floor, 0.0) + slack) / (max(step.after - step.floor, 0.0) + slack))
+    return margin, growth.rest
 
 
 def confidence_of(growth: Growth, step: Step) -> float:

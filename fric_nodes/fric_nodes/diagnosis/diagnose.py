@@ -26,7 +26,7 @@ from ..model import Model
 from ..record import Array, Record
 from .candidates import Scales, candidates, place_of, scales_of
 from .confidence import confidence_of, unknown_confidence
-from .grow import Growth, State, Step, grow, refit
+from .grow import Growth, Step, grow
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
 from .screen import Tried
@@ -38,7 +38,8 @@ __all__ = ["DiagnosisError", "diagnose"]
 _BANDWIDTHS = (45.0, 140.0, 400.0)  # [rad/s]
 _FAST = 1.0  # largest product of bandwidth and sample time
 _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
-_UNEXPLAINED = 0.35  # of what was missing: with more left, something unknown remains
+_UNEXPLAINED = 0.2  # of what was missing: with more left, something unknown remains
+_HARDLY = 0.6  # with more than this left, what was found is no explanation and is not named
 _LOCATING = 300.0  # [rad/s], for spans of time
 
 
@@ -69,10 +70,9 @@ def diagnose(
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
     start = _started(nominal, train)
-    track, begin = _best_track(train, start)
-    growth = grow(track, begin.fit.model, tell)
+    growth = grow(_tracks(train, start), start, tell)
     tell("judging on the validation recordings")
-    return _concluded(train, validation, nominal, checks, corrected, track, growth)
+    return _concluded(train, validation, nominal, checks, corrected, growth)
 
 
 def _refuse(train: Sequence[Record], validation: Sequence[Record]) -> None:
@@ -122,21 +122,14 @@ def _started(nominal: Model, train: Sequence[Record]) -> Model:
     return found if np.all(np.isfinite(found.values)) else nominal
 
 
-def _best_track(train: Sequence[Record], start: Model) -> tuple[Track, State]:
-    """The bandwidth at which what is missing stands out most from the floor."""
-    best: tuple[float, Track, State] | None = None
+def _tracks(train: Sequence[Record], start: Model) -> list[Track]:
+    """The recordings followed at several bandwidths."""
     step = max(record.sample_time for record in train)
     allowed = [w for w in _BANDWIDTHS if w * step <= _FAST] or [_FAST / step]
-    for bandwidth in allowed:
-        track = Track.of(train, bandwidth, start)
-        if not track.runs:
-            raise DiagnosisError(train[0].source, "has no valid part of 200 samples", "record for longer")
-        state = refit(track, start)
-        quality = state.excess / max(state.floor, 1e-300)
-        if best is None or quality > best[0]:
-            best = (quality, track, state)
-    assert best is not None
-    return best[1], best[2]
+    tracks = [Track.of(train, bandwidth, start) for bandwidth in allowed]
+    if not tracks[0].runs:
+        raise DiagnosisError(train[0].source, "has no valid part of 200 samples", "record for longer")
+    return tracks
 
 
 def _concluded(
@@ -145,21 +138,12 @@ def _concluded(
     nominal: Model,
     checks: Sequence[Check],
     corrected: Sequence[str],
-    track: Track,
     growth: Growth,
 ) -> Diagnosis:
+    track = growth.track
     begin, end = growth.begin.fit.model, _with_errors(track, growth.end.fit)
     held = _shown(validation, track, begin)
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
-    if float(left["augmented"] @ left["augmented"]) > float(left["refit"] @ left["refit"]):
-        # What unseen recordings contradict isn't handed out, whatever the blocks said.
-        growth = replace(
-            growth,
-            end=growth.begin,
-            steps=(),
-            rejected=(*growth.rejected, *((s.term, "made the validation recording worse") for s in growth.steps)),
-        )
-        end, left["augmented"] = _with_errors(track, growth.begin.fit), left["refit"]
     effort = held.joined([run.effort for run in held.runs])
     spread = float(np.sum((effort - np.mean(effort)) ** 2))
     floor = [held.residual(end, twin.efforts, twin.positions) for twin in twins(held, end, 3)]
@@ -169,14 +153,14 @@ def _concluded(
     missing = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
     scales = scales_of(held)
     findings = [_finding(validation, held, growth, end, step, scored, scales) for step in growth.steps]
-    rest = growth.end.excess / max(growth.begin.excess, 1e-300) if missing else 0.0
-    unknown = missing and (growth.end.excess > _MISMATCH * growth.end.floor) and (rest > _UNEXPLAINED or not findings)
+    rest = growth.rest if missing else 0.0
+    unknown = missing and (rest > _UNEXPLAINED or not findings)
     unexplained = Unexplained(rest, None)
-    if missing and growth.end.excess > _MISMATCH * growth.end.floor:
+    if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
         where = _where_left(held, left["augmented"], floor, scales, end)
         unexplained = Unexplained(rest, where)
         if unknown:
-            findings = [_unknown(where, growth, scored, rest), *([] if rest > 0.6 else findings)]
+            findings = [_unknown(where, growth, scored, rest), *([] if rest > _HARDLY else findings)]
     return Diagnosis(
         mismatch=missing,
         checks=tuple(checks),
@@ -239,9 +223,9 @@ def _finding(
         h = float(np.median(run.step))
         energy.append(steady(moved_back(before - after, h, fast.bandwidth) ** 2, h))
     where = locate(fast, energy, scales, end)
-    excess = max(growth.begin.excess, 1e-300)
-    share = min(max((step.before - step.after) / excess, 0.0), 1.0)
-    rival = next((each for each in step.rivals if each.effect.id != effect.id), None)
+    excess = max(step.missing, 1e-300)
+    share = min(max((step.before - step.after) / max(excess, growth.begin.excess), 0.0), 1.0)
+    rival = next((each for each in step.rivals if effect.id not in {name.split("#")[0] for name in each.names}), None)
     sure = confidence_of(growth, step)
     parameters = {
         p.name: Estimate(p.value, end.standard_errors.get(p.name), p.declaration.unit(end.units))
@@ -324,7 +308,7 @@ def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, .
         for rival in step.rivals:
             if rival.effect.id not in there:
                 found[rival.effect.id] = (
-                    f"fitted in full it takes {_percent(step.before - rival.left, excess)} away, less than {step.term}"
+                    f"fitted in full it takes {_percent(step.before - rival.left, excess)} away, {step.term} more"
                 )
     offered = {candidate.effect.id for candidate in candidates(begin, scales)}
     for effect in EFFECTS.values():

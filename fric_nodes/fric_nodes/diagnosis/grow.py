@@ -21,7 +21,7 @@ from .screen import Gram, Screening, Tried, blocks_of, screen
 from .track import Bounds, Fit, Track
 from .twin import twins
 
-__all__ = ["Growth", "Rival", "Step", "grow", "refit"]
+__all__ = ["Growth", "Rival", "State", "Step", "audit", "best_track", "grow", "refit"]
 
 _TWINS = 3
 _PAIRS_FITTED = 2
@@ -30,7 +30,10 @@ _PER_PARAMETER = 0.012  # of what is missing
 _FITTED = 4  # candidates that are fitted in full at each step
 _MOST_TERMS = 5
 _OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
-_OF_EXCESS = 0.02  # and of what is missing at the start
+_OF_EXCESS = 0.12  # and of what is missing: less is no explanation
+_TO_STAY = 0.01  # of what is missing at the start, beside all other terms
+_LITTLE = 0.004  # of what is missing at the start: laws that differ in form only leave as much
+_CLEAR = 25.0  # times the floor
 _BY_CHANCE = 6.0  # and times what candidates take off twins
 _SAME = 0.35  # of the floor: nothing is missing when less than this is left above it
 
@@ -82,11 +85,23 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A term that came: what was left before and after it, and the rivals that were fitted in its place, best first."""
+    """A term that came.
+
+    Attributes:
+        term: its name in the grown model.
+        before: sum of squares on unseen blocks without it [F^2].
+        after: with it [F^2].
+        floor: what twins left then [F^2].
+        missing: what was missing then, above the floor [F^2].
+        rivals: what was fitted in its place, the best first.
+        screened: all candidates at first order, the best first.
+    """
 
     term: str
     before: float
     after: float
+    floor: float
+    missing: float
     rivals: tuple[Rival, ...]
     screened: tuple[Tried, ...]
 
@@ -96,17 +111,21 @@ class Growth:
     """How a model grew.
 
     Attributes:
+        track: the observer that it ended with; ``begin`` and ``end`` are as it sees them.
         begin: the refitted nominal model.
         end: the grown model.
         steps: the terms that stayed, in the order in which they came.
         last: the last screening, of what did not come.
+        rest: share of what is missing that the grown model lacks too, where it was not fitted.
         rejected: terms that came and went, with the reason.
     """
 
+    track: Track
     begin: State
     end: State
     steps: tuple[Step, ...]
     last: tuple[Tried, ...]
+    rest: float
     rejected: tuple[tuple[str, str], ...] = field(default=())
 
 
@@ -191,39 +210,91 @@ def _bounds(model: Model, scales: Scales) -> Bounds:
     return found
 
 
-def grow(track: Track, nominal: Model, progress: Callable[[str], None] | None = None) -> Growth:
-    """Grow ``nominal``, already refitted in structure, until nothing is missing or nothing helps."""
+def best_track(tracks: Sequence[Track], model: Model, max_iterations: int = 12) -> tuple[Track, State]:
+    """The fastest observer to which what ``model`` lacks stands out clearly from the floor, or the one to which it does most."""
+    best: tuple[float, Track, State] | None = None
+    for track in sorted(tracks, key=lambda each: -each.bandwidth):
+        state = refit(track, model, max_iterations=max_iterations)
+        quality = state.excess / max(state.floor, 1e-300)
+        if best is None or quality > best[0]:
+            best = (quality, track, state)
+        if quality > _CLEAR:
+            return track, state
+    assert best is not None
+    return best[1], best[2]
+
+
+def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None] | None = None) -> Growth:
+    """Grow ``nominal`` until nothing is missing or nothing helps.
+
+    Args:
+        tracks: the same recordings, followed at several bandwidths.
+        nominal: with values that a fit can start from.
+        progress: told what comes.
+    """
     tell = progress or (lambda _: None)
-    begin = refit(track, nominal)
+    track, begin = best_track(tracks, nominal)
     scales = scales_of(track)
     state = begin
     steps: list[Step] = []
-    rejected: list[tuple[str, str]] = []
     last: tuple[Tried, ...] = ()
-    while len(steps) < _MOST_TERMS:
+    while True:
         found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
         last = found.tried
-        if state.excess < _SAME * state.floor and not _worth(begin, state, found.tried):
+        if len(steps) >= _MOST_TERMS or (state.excess < _SAME * state.floor and not _worth(state, found.tried)):
             break
         rivals = rivals_of(track, state, found, scales)
-        if not rivals or not _earns(begin, state, rivals[0].left, found.tried):
+        if not rivals or not _earns(state, rivals[0].left, found.tried):
             break
         best = rivals[0]
         tell(
-            f"{' and '.join(best.names)}: {100 * (state.left - best.left) / max(begin.excess, 1e-300):.0f} % of what is missing"
+            f"{' and '.join(best.names)}: {100 * (state.left - best.left) / max(state.excess, 1e-300):.0f} % of what is missing"
         )
         before = state.left
         for k, name in enumerate(best.names):
             after = best.left if k == len(best.names) - 1 else best.halfway
-            steps.append(Step(name, before, after, tuple(rivals[1:]), last))
+            steps.append(Step(name, before, after, state.floor, state.excess, tuple(rivals[1:]), last))
             before = after
-        state = refit(track, best.fit.model, max_iterations=6)
+        # What is left may show best to another observer.
+        track, state = best_track(tracks, best.fit.model, max_iterations=6)
+        scales = scales_of(track)
+        begin_here = refit(track, begin.fit.model, max_iterations=4)
+        if state.excess < _LITTLE * begin_here.excess:
+            found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
+            last = found.tried
+            break
+    begin = refit(track, begin.fit.model, max_iterations=6)
     state, steps, gone = _pruned(track, begin, state, steps)
     if len(steps) > 1:
         state, steps = _exchanged(track, begin, state, steps, scales)
         state, steps, more = _pruned(track, begin, state, steps)
         gone += more
-    return Growth(begin, state, tuple(steps), last, (*rejected, *gone))
+    rest = audit(track, begin.fit.model, state.fit.model) if steps else 1.0
+    if rest > 1.0:
+        gone += [(step.term, "made what it was not fitted to worse") for step in steps]
+        state, steps, rest = begin, [], 1.0
+    return Growth(track, begin, state, tuple(steps), last, rest, tuple(gone))
+
+
+def audit(track: Track, begin: Model, end: Model) -> float:
+    """Share of what ``begin`` lacks that ``end`` lacks too, both fitted to one half of the recordings and judged on the other.
+
+    The halves interleave: first and third quarter against second and fourth. Above 1 the grown model is the worse one.
+    """
+    quarters = track.parts(4)
+    halves = [quarters[0].with_runs_of(quarters[2]), quarters[1].with_runs_of(quarters[3])]
+    if any(not half.runs for half in halves):
+        return 0.0
+    lacking = {"begin": 0.0, "end": 0.0}
+    floor = 0.0
+    for one, other in (halves, halves[::-1]):
+        for name, model in (("begin", begin), ("end", end)):
+            fitted = one.fit(model, free_names(model), 6).model
+            left = other.residual(fitted)
+            lacking[name] += float(left @ left)
+        made = [other.residual(end, twin.efforts, twin.positions) for twin in twins(other, end, 2)]
+        floor += float(np.mean([each @ each for each in made]))
+    return max(lacking["end"] - floor, 0.0) / max(lacking["begin"] - floor, 1e-300)
 
 
 def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scales: Scales) -> tuple[State, list[Step]]:
@@ -238,11 +309,13 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         rivals = [
             rival for rival in rivals_of(track, without, replace(found, pairs=()), scales) if rival.effect.id != effect_id
         ]
-        if rivals and state.left - rivals[0].left > max(_OF_FLOOR * state.floor, 0.5 * _OF_EXCESS * begin.excess):
+        if rivals and state.left - rivals[0].left > max(_OF_FLOOR * state.floor, _TO_STAY * begin.excess):
             state = refit(track, rivals[0].fit.model, max_iterations=6)
-            steps[k] = Step(rivals[0].names[0], without.left, state.left, tuple(rivals[1:]), found.tried)
+            steps[k] = Step(
+                rivals[0].names[0], without.left, state.left, without.floor, without.excess, tuple(rivals[1:]), found.tried
+            )
         else:
-            steps[k] = Step(step.term, without.left, state.left, tuple(rivals), found.tried)
+            steps[k] = Step(step.term, without.left, state.left, without.floor, without.excess, tuple(rivals), found.tried)
     return state, steps
 
 
@@ -283,15 +356,15 @@ def _name_of(model: Model, effect: Effect) -> str:
     return [prefix for prefix, held in zip(model.prefixes, model.terms, strict=True) if held.effect is effect][-1]
 
 
-def _worth(begin: State, state: State, tried: Sequence[Tried]) -> bool:
+def _worth(state: State, tried: Sequence[Tried]) -> bool:
     """True when a screened candidate promises a real gain although nothing much is left."""
-    return bool(tried) and _earns(begin, state, tried[0].left, tried)
+    return bool(tried) and _earns(state, tried[0].left, tried)
 
 
-def _earns(begin: State, state: State, left: float, tried: Sequence[Tried]) -> bool:
+def _earns(state: State, left: float, tried: Sequence[Tried]) -> bool:
     gain = state.left - left
     chance = max((each.by_chance for each in tried), default=0.0)
-    return gain > max(_OF_FLOOR * state.floor, _OF_EXCESS * begin.excess, _BY_CHANCE * chance)
+    return gain > max(_OF_FLOOR * state.floor, _OF_EXCESS * state.excess, _BY_CHANCE * chance)
 
 
 def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step], list[tuple[str, str]]]:
@@ -306,7 +379,7 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
             continue
         without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
         lost = without.left - state.left
-        if lost < max(_OF_FLOOR * state.floor, 0.5 * _OF_EXCESS * begin.excess):
+        if lost < max(_OF_FLOOR * state.floor, _TO_STAY * begin.excess):
             state = without
             steps = [each for each in steps if each is not step]
             gone.append((effect_id, "not needed any more beside the terms that came after it"))

@@ -17,7 +17,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import lfilter
@@ -33,6 +34,7 @@ __all__ = ["Track", "resolution"]
 
 _STEP_OF_RATE = 0.2
 _SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
+_SHORTEST = 200  # samples of a run
 _SHAKEN = 0.4  # steps of the encoder that count as its noise
 _LARGEST = 1e6  # of the force range; a model that escapes must cost much, not break the solver
 
@@ -80,7 +82,7 @@ class Track:
         for k, record in enumerate(records):
             found = runs_of(record)
             bounds = np.flatnonzero(np.diff(np.concatenate([[False], record.mask, [False]]).astype(np.int8)))
-            starts = [int(first) for first, last in zip(bounds[::2], bounds[1::2], strict=True) if last - first >= 200]
+            starts = [int(first) for first, last in zip(bounds[::2], bounds[1::2], strict=True) if last - first >= _SHORTEST]
             for run, first in zip(found, starts, strict=True):
                 runs.append(run)
                 time.append(record.time[first] + np.cumsum(run.step))
@@ -88,6 +90,40 @@ class Track:
                 noise.append(max(noise_of(run.position), _SHAKEN * resolution(run.position)))
         mass = model.plant.total_inertia(*model.plant_values)
         return cls(tuple(runs), tuple(time), tuple(number), bandwidth, mass, tuple(noise), _sizes(runs, mass))
+
+    def parts(self, n_parts: int) -> list[Track]:
+        """The same recordings cut into ``n_parts`` contiguous parts, each a track of its own."""
+        total = sum(run.effort.shape[0] for run in self.runs)
+        cuts = [round(total * k / n_parts) for k in range(n_parts + 1)]
+        found = []
+        for low, high in pairwise(cuts):
+            held = replace(self, runs=(), time=(), record=(), noise=())
+            begin = 0
+            for k, run in enumerate(self.runs):
+                n = run.effort.shape[0]
+                first, last = max(low - begin, 0), min(high - begin, n)
+                if last - first >= _SHORTEST:
+                    held = held.with_run(run.part(first, last), self.time[k][first:last], self.record[k], self.noise[k])
+                begin += n
+            found.append(held)
+        return found
+
+    def with_run(self, run: Run, time: Array, record: int, noise: float) -> Track:
+        """The same with one more run."""
+        return replace(
+            self,
+            runs=(*self.runs, run),
+            time=(*self.time, time),
+            record=(*self.record, record),
+            noise=(*self.noise, noise),
+        )
+
+    def with_runs_of(self, other: Track) -> Track:
+        """The runs of both."""
+        joined = self
+        for each in zip(other.runs, other.time, other.record, other.noise, strict=True):
+            joined = joined.with_run(*each)
+        return joined
 
     @property
     def starts(self) -> Index:

@@ -51,7 +51,7 @@ def _led(track: Track, model: Model, run: Run) -> tuple[Array, Array]:
     position = np.concatenate([[run.start[0]], run.position])
     wanted = smooth(position, step, _SMOOTH * track.bandwidth)
     rate = np.gradient(wanted, step)
-    lead = min(_LED * track.bandwidth, 0.5 / step)
+    lead = min(_LED * track.bandwidth, 0.15 / step)
     plant_values = np.array(model.plant_values)
     state = np.ascontiguousarray(universe.plant.start(plant_values, float(wanted[0]), float(rate[0])), dtype=np.float64)
     there, given = np.empty(run.effort.shape[0]), np.empty(run.effort.shape[0])
