@@ -1,0 +1,109 @@
+"""Cases: they are what their kind promises, follow from the seed, and fric's own models agree with the physics in them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from fric_nodes.diagnosis.prove.cases import KINDS, VARIANTS, Case, draw, plan
+from fric_nodes.diagnosis.prove.concealed import CONCEALED, clash
+from fric_nodes.diagnosis.prove.outside import OUTSIDE
+from fric_nodes.effects import EFFECTS
+from fric_nodes.errors import InputError
+from fric_nodes.identification.result import Options
+from fric_nodes.identification.scoring import score
+from fric_nodes.model_file import model_from_text
+
+_COMPONENTS = {"command path", "transmission", "guideway friction", "load", "sensor"}
+
+
+def test_the_examiner_conceals_every_effect_of_the_registry() -> None:
+    assert set(CONCEALED) == {effect.id for effect in EFFECTS.values()}
+
+
+def test_at_least_six_kinds_lie_outside_the_vocabulary_each_with_its_place() -> None:
+    assert len(OUTSIDE) >= 6
+    assert not set(OUTSIDE) & set(CONCEALED)
+    assert all(each.components and each.components <= _COMPONENTS for each in OUTSIDE.values())
+
+
+def test_a_plan_is_balanced_and_follows_from_its_seed() -> None:
+    orders = plan(300, 4)
+    assert orders == plan(300, 4)
+    assert orders != plan(300, 5)
+    counts = {kind: sum(order.kind == kind for order in orders) for kind in KINDS}
+    assert counts["nothing"] >= 60
+    assert sum(counts.values()) == 300
+    for kind, names in (("moderate", CONCEALED), ("weak", CONCEALED), ("unknown", OUTSIDE)):
+        each = [sum(order.names == (name,) for order in orders if order.kind == kind) for name in names]
+        assert max(each) - min(each) <= 1
+    assert all(not clash(*(CONCEALED[name] for name in order.names)) for order in orders if order.kind == "pair")
+    assert len({order.seed for order in orders}) == 300
+
+
+@pytest.mark.parametrize("kind", ["moderate", "weak"])
+def test_strength_is_what_the_kind_says_and_the_seed_gives_the_same_case(kind: str) -> None:
+    first, second = draw(5, kind, "stribeck"), draw(5, kind, "stribeck")
+    np.testing.assert_array_equal(first.train[0].effort, second.train[0].effort)
+    assert first.key == second.key
+    ratio = first.key["noe_refit"] / first.key["noise_floor"]
+    if kind == "weak":
+        assert 3.0 <= ratio <= 5.0
+    else:
+        assert 1.0 <= first.key["noe_refit"] <= 15.0
+        assert ratio >= 15.0
+
+
+def test_nominal_values_are_off_and_nothing_else_is_told() -> None:
+    case = draw(6, "moderate", "stribeck")
+    errors = [abs(value) for value in case.key["nominal_error_percent"].values() if value != 0.0]
+    assert all(4.99 <= error <= 40.01 for error in errors)
+    assert "stribeck" not in {held.effect.id for held in case.nominal.terms}
+    assert not case.nominal.provenance
+
+
+def _noe(case: Case, text: str | None = None) -> float:
+    model = case.nominal if text is None else model_from_text(text)
+    return score(model, list(case.validation), Options()).noe
+
+
+@pytest.mark.parametrize("effect", ["ripple", "load_dependence", "actuator_lag", "presliding", "temperature"])
+def test_frics_own_model_with_the_true_values_explains_the_recording(effect: str) -> None:
+    case = draw(12, "moderate", effect)
+    assert _noe(case, case.key["true_structure"]) < 0.3 * case.key["noe_refit"]
+    assert _noe(case) > 3.0 * _noe(case, case.key["true_structure"])
+
+
+def test_where_nothing_is_missing_the_nominal_structure_explains_it_all() -> None:
+    case = draw(8, "nothing")
+    assert case.key["effects"] == []
+    assert case.key["noe_refit"] < case.key["noise_floor"]
+
+
+def test_the_energy_adds_up_to_the_strength_and_shows_when_a_payload_joins() -> None:
+    case = draw(3, "unknown", "payload_step")
+    energy = np.array(case.key["energy"])
+    duration = case.validation[0].duration
+    assert energy.shape[0] * case.key["cell"] == pytest.approx(duration, abs=0.03)
+    assert np.all(energy >= 0.0)
+    assert json.loads(json.dumps(dict(case.key)))["components"] == ["load"]
+
+
+def test_other_forms_and_rates() -> None:
+    assert draw(4, "moderate", "presliding", "form").key["forms"][0] > 0
+    half, double = draw(4, "moderate", "viscous", "half-rate"), draw(4, "moderate", "viscous", "double-rate")
+    assert half.train[0].sample_time in (pytest.approx(1 / 250), pytest.approx(1 / 500))
+    assert double.train[0].sample_time in (pytest.approx(1 / 1000), pytest.approx(1 / 2000))
+
+
+def test_refusals() -> None:
+    with pytest.raises(InputError, match="stribek"):
+        draw(1, "moderate", "stribek")
+    with pytest.raises(InputError, match="use one of"):
+        draw(1, "strong")
+    with pytest.raises(InputError, match="variant"):
+        plan(10, 1, "odd")
+    with pytest.raises(InputError, match="cases"):
+        plan(0, 1)
+    assert set(VARIANTS) == {"standard", "form", "half-rate", "double-rate"}
