@@ -26,14 +26,14 @@ from ..model import Model
 from ..record import Array, Record
 from .candidates import Scales, candidates, place_of, scales_of
 from .confidence import confidence_of, unknown_confidence
-from .grow import Growth, Step, grow
+from .grow import Growth, Step, best_track, grow
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
 from .screen import Tried
 from .track import Fit, Track
 from .twin import twins
 
-__all__ = ["DiagnosisError", "diagnose"]
+__all__ = ["DiagnosisError", "diagnose", "refit_noe"]
 
 _BANDWIDTHS = (45.0, 140.0, 400.0)  # [rad/s]
 _FAST = 1.0  # largest product of bandwidth and sample time
@@ -73,6 +73,22 @@ def diagnose(
     growth = grow(_tracks(train, start), start, tell)
     tell("judging on the validation recordings")
     return _concluded(train, validation, nominal, checks, corrected, growth)
+
+
+def refit_noe(model: Model, train: Sequence[Record], validation: Sequence[Record], bandwidth: float) -> float:
+    """NOE of ``model``, fitted to ``train``, on ``validation`` [%], as an observer of ``bandwidth`` [rad/s] sees it."""
+    conditions = nominal_conditions(train) | dict(model.nominal)
+    train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
+    track, state = best_track(_tracks(train, model), model)
+    held = replace(Track.of(validation, bandwidth, model), mass=track.mass)
+    left = held.residual(state.fit.model)
+    return 100.0 * float(left @ left) / _spread(held)
+
+
+def _spread(track: Track) -> float:
+    """Sum of squares of the recorded force about its mean [F^2]."""
+    effort = track.joined([run.effort for run in track.runs])
+    return float(np.sum((effort - np.mean(effort)) ** 2))
 
 
 def _refuse(train: Sequence[Record], validation: Sequence[Record]) -> None:
@@ -144,8 +160,7 @@ def _concluded(
     begin, end = growth.begin.fit.model, _with_errors(track, growth.end.fit)
     held = _shown(validation, track, begin)
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
-    effort = held.joined([run.effort for run in held.runs])
-    spread = float(np.sum((effort - np.mean(effort)) ** 2))
+    spread = _spread(held)
     floor = [held.residual(end, twin.efforts, twin.positions) for twin in twins(held, end, 3)]
     noe = {name: 100.0 * float(each @ each) / spread for name, each in left.items()}
     noise_floor = 100.0 * float(np.mean([each @ each for each in floor])) / spread
@@ -329,8 +344,8 @@ def _next(findings: Sequence[Finding], growth: Growth) -> str:
             return f"to tell {effect.id} from {finding.runner_up.effect}: {effect.looks_like[finding.runner_up.effect]}"
         if finding.effect == "unknown":
             return (
-                f"repeat the motion and vary one thing at a time where the mismatch sits ({finding.where.regime}): speed, place, "
-                "load, the rest before it"
+                f"repeat the motion and vary one thing at a time where the mismatch sits ({finding.where.regime}): speed, "
+                "place, load, the rest before it"
             )
     if not findings:
         return "none needed: what is left is what the instruments leave"

@@ -211,7 +211,7 @@ def _bounds(model: Model, scales: Scales) -> Bounds:
 
 
 def best_track(tracks: Sequence[Track], model: Model, max_iterations: int = 12) -> tuple[Track, State]:
-    """The fastest observer to which what ``model`` lacks stands out clearly from the floor, or the one to which it does most."""
+    """The fastest observer to which what ``model`` lacks stands out clearly, or the one to which it does most."""
     best: tuple[float, Track, State] | None = None
     for track in sorted(tracks, key=lambda each: -each.bandwidth):
         state = refit(track, model, max_iterations=max_iterations)
@@ -244,7 +244,7 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
         if len(steps) >= _MOST_TERMS or (state.excess < _SAME * state.floor and not _worth(state, found.tried)):
             break
         rivals = rivals_of(track, state, found, scales)
-        if not rivals or not _earns(state, rivals[0].left, found.tried):
+        if not rivals or not _earns(state, rivals[0].left, rivals[0].offer):
             break
         best = rivals[0]
         tell(
@@ -358,10 +358,11 @@ def _name_of(model: Model, effect: Effect) -> str:
 
 def _worth(state: State, tried: Sequence[Tried]) -> bool:
     """True when a screened candidate promises a real gain although nothing much is left."""
-    return bool(tried) and _earns(state, tried[0].left, tried)
+    return bool(tried) and _earns(state, tried[0].left, tried[:1])
 
 
 def _earns(state: State, left: float, tried: Sequence[Tried]) -> bool:
+    """True when leaving ``left`` is more than what ``tried`` takes off by chance, and a real part of what is missing."""
     gain = state.left - left
     chance = max((each.by_chance for each in tried), default=0.0)
     return gain > max(_OF_FLOOR * state.floor, _OF_EXCESS * state.excess, _BY_CHANCE * chance)

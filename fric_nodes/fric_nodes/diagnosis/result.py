@@ -207,6 +207,7 @@ class Diagnosis:
             "unexplained": {"share": self.unexplained.share, "where": _where(self.unexplained.where)},
             "next_experiment": self.next_experiment,
             "notes": list(self.notes),
+            "observer_bandwidth": self.bandwidth,
         }
         found: dict[str, Any] = _finite(report)
         return found
