@@ -1,0 +1,109 @@
+"""The diagnosis on recordings of an integrator that shares nothing with it, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fric_nodes.diagnosis import Diagnosis, DiagnosisError, diagnose
+from fric_nodes.diagnosis.prove import draw
+from fric_nodes.model_file import model_from_text, model_to_text
+from fric_nodes.report.diagnosis import diagnosis_report
+
+pytestmark = pytest.mark.timeout(600)  # the first of them compiles what all share
+
+
+@pytest.fixture(scope="module")
+def presliding() -> tuple[object, Diagnosis]:
+    case = draw(0, "moderate", "presliding")
+    return case, diagnose(case.train, case.validation, case.nominal)
+
+
+def test_nothing_is_found_where_nothing_is_missing() -> None:
+    case = draw(3, "nothing")
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert not found.mismatch
+    assert found.findings == ()
+    assert "Nothing is missing" in found.sentence
+    # What it leaves is what its own twin says that the instruments leave.
+    assert found.validation.noe_refit == pytest.approx(found.validation.noise_floor, rel=0.3)
+
+
+@pytest.mark.parametrize("effect", ["position_dependence", "asymmetry", "accel_hysteresis"])
+def test_a_concealed_effect_is_named(effect: str) -> None:
+    case = draw(2, "moderate", effect)
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert [each.effect for each in found.findings][:1] == [effect]
+    assert found.findings[0].confidence > 0.5
+    v = found.validation
+    assert v.noe_augmented - v.noise_floor < 0.1 * (v.noe_refit - v.noise_floor)
+
+
+def test_concealed_bristles_are_named_and_located(presliding: tuple[object, Diagnosis]) -> None:
+    _, found = presliding
+    assert [each.effect for each in found.findings] == ["presliding"]
+    assert found.findings[0].component == "guideway friction"
+    where = found.findings[0].where
+    assert where.quantity in {"speed", "time since reversal", "distance since reversal"}
+    assert where.range[0] < 0.1 * where.range[1]  # slow, or soon after a reversal
+    assert where.time_share < 0.4
+    assert where.share >= 0.8
+    assert found.validation.noe_augmented < 0.1 * found.validation.noe_refit
+    assert found.unexplained.share < 0.05
+
+
+def test_physics_that_no_effect_describes_is_said_to_be_unknown() -> None:
+    case = draw(0, "unknown", "payload_step")
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert found.mismatch
+    assert found.findings[0].effect == "unknown"
+
+
+def test_the_report_is_plain_data_and_the_grown_model_reads_back(presliding: tuple[object, Diagnosis]) -> None:
+    _, found = presliding
+    report = json.loads(json.dumps(found.report(), allow_nan=False))
+    assert report["format"] == "fric-report/1"
+    for key in ("checks", "nominal", "findings", "rejected", "validation", "unexplained", "next_experiment"):
+        assert key in report
+    assert {each["effect"] for each in report["rejected"]}.isdisjoint({each["effect"] for each in report["findings"]})
+    again = model_from_text(model_to_text(found.model), "grown")
+    assert again.names == found.model.names
+    np.testing.assert_allclose(again.values, found.model.values, rtol=1e-12)
+
+
+def test_predictions_are_of_the_validation_recording(presliding: tuple[object, Diagnosis]) -> None:
+    case, found = presliding
+    record = case.validation[0]  # type: ignore[attr-defined]
+    p = found.prediction[0]
+    measured = np.interp(p.time - 0.5 * record.sample_time, record.time, record.effort)
+    assert np.corrcoef(p.force_measured, measured)[0, 1] > 0.97
+    error = p.force_measured - p.force_refit
+    spread = p.force_measured - np.mean(p.force_measured)
+    assert 100.0 * error @ error / (spread @ spread) == pytest.approx(found.validation.noe_refit, rel=1e-6)
+
+
+def test_the_page_is_whole(presliding: tuple[object, Diagnosis]) -> None:
+    case, found = presliding
+    page = diagnosis_report(found, case.train, case.validation)  # type: ignore[attr-defined]
+    assert found.sentence.split(":", maxsplit=1)[0] in page
+    for heading in ("The difference", "How the model grew", "Effects that are not there", "Grown model"):
+        assert heading in page
+
+
+def test_the_recording_that_was_learnt_from_is_no_validation() -> None:
+    case = draw(3, "nothing")
+    with pytest.raises(DiagnosisError, match="learnt from, too"):
+        diagnose(case.train, case.train, case.nominal)
+
+
+def test_rest_and_missing_force_are_refused() -> None:
+    case = draw(3, "nothing")
+    record = case.train[0]
+    still = replace(record, position=np.zeros(record.n_samples))
+    with pytest.raises(DiagnosisError, match="nothing but rest"):
+        diagnose([still], case.validation, case.nominal)
+    silent = replace(record, effort=np.zeros(record.n_samples))
+    with pytest.raises(DiagnosisError, match="no force signal"):
+        diagnose([silent], case.validation, case.nominal)

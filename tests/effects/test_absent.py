@@ -1,0 +1,66 @@
+"""What a diagnosis relies on: at its neutral values an effect does nothing, and a switch that is off leaves it out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fric_nodes.diagnosis.universe import universe_of
+from fric_nodes.effects import EFFECTS
+from fric_nodes.model import Model, Term, build_model, term
+from fric_nodes.record import Array
+from fric_nodes.simulate import Simulator, simulate
+
+H = 1e-3
+ABLE = [effect for effect in EFFECTS.values() if effect.neutral is not None]
+
+
+def force() -> Array:
+    t = H * np.arange(1500)
+    return np.asarray(18.0 * np.sin(2 * np.pi * 1.3 * t) + 6.0 * np.sin(2 * np.pi * 7.1 * t + 1.0))
+
+
+def base() -> Model:
+    return build_model("rigid", {"mass": 2.0}, [term("coulomb", force=5.0), term("viscous", coefficient=20.0)])
+
+
+@pytest.mark.parametrize("effect", ABLE, ids=[effect.key for effect in ABLE])
+def test_neutral_values_leave_the_motion_as_it_was(effect) -> None:  # type: ignore[no-untyped-def]
+    model = base()
+    assert effect.neutral is not None
+    kept = [held for held in model.terms if held.effect.id != effect.id]
+    plain = model.with_terms(kept)
+    beside = model.with_terms((*kept, Term(effect, effect.neutral)))
+    expected = simulate(plain, force(), H, n_substeps=4)
+    found = simulate(beside, force(), H, n_substeps=4)
+    assert np.max(np.abs(found.position - expected.position)) <= 1e-9 * np.ptp(expected.position)
+
+
+def test_an_effect_with_an_amplitude_is_not_always_neutral() -> None:
+    strong = base().with_terms((*base().terms, term("bias", force=4.0)))
+    assert abs(simulate(strong, force(), H).position[-1] - simulate(base(), force(), H).position[-1]) > 1e-3
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        (),
+        (term("stribeck", force=2.0, velocity=0.03),),
+        (term("presliding", stiffness=1e5, damping=200.0), term("ripple", cosine=1.0, sine=0.5, period=0.02)),
+        (term("backlash", gap=1e-4), term("actuator_lag", time=2e-3)),
+    ],
+    ids=["plain", "level", "slip and force", "transmission and command"],
+)
+def test_the_universe_moves_as_the_model_does(more: tuple[Term, ...]) -> None:
+    """The same model, once compiled alone and once among all candidates that are switched off."""
+    model = base().with_terms((*base().terms, *more))
+    effort = force()
+    alone = Simulator(model)
+    expected, _ = alone.run(effort, H, 4)
+    universe = universe_of(model)
+    states = np.ascontiguousarray(universe.plant.start(np.array(model.plant_values), 0.0, 0.0))
+    found, friction, applied = np.empty_like(expected), np.empty(effort.shape[0]), np.empty(effort.shape[0])
+    universe.loops.simulate(
+        universe.values(model), effort, H, 4, 0.0, np.ones(1), np.zeros(1), states, *universe.inner_states(model), found,
+        friction, applied,
+    )  # fmt: skip
+    assert np.max(np.abs(found - expected)) <= 1e-9 * np.max(np.abs(expected))
