@@ -99,7 +99,9 @@ def test_seal_friction_grows_with_pressure(data_folder: Path, seal: str) -> None
         assert 0.1e-3 < each.distance[0] < 0.7e-3
         assert each.coarse
     assert found.compliance is not None
-    assert found.compliance.interval(found.compliance.compliance)[1] < 1e-4
+    # Neither shows a rig; the distances, ten samples a reversal, scatter by more than their errors.
+    assert found.compliance.interval(found.compliance.compliance)[0] < 0.0
+    assert found.compliance.interval(found.compliance.compliance)[1] < 1.5e-4
     low, high = found.compliance.interval(found.compliance.distance)
     assert low < 0.4e-3 < high < 1e-3
     if found.compliance.told_apart:

@@ -35,7 +35,7 @@ from ..simulate import Motion, predict_force
 from .tensor_product_transformation import TensorProduct, TensorProductError, transform
 from .two_branches import Tables, simulate_mass
 
-__all__ = ["TensorProductFriction", "from_data", "from_law", "from_model", "velocity_grid"]
+__all__ = ["TensorProductFriction", "from_data", "from_law", "from_model", "from_points", "velocity_grid"]
 
 Law = Callable[[Array], Array]
 
@@ -241,6 +241,23 @@ def from_data(
         v = np.concatenate([-halves[1][0, ::-1], halves[0][0]])
         branches.append((v, np.concatenate([-halves[1][1, ::-1], halves[0][1]])))
     return _built(mass, branches[0], branches[1], shared)
+
+
+def from_points(
+    speeding_up: tuple[Array, Array], slowing_down: tuple[Array, Array], mass: float, *, shared: bool = True
+) -> TensorProductFriction:
+    """The tensor-product form of friction that is known at some velocities.
+
+    Args:
+        speeding_up: velocities [x/s], increasing, on both sides of 0, and the friction force [F] there, each ``(n,)``.
+        slowing_down: the same of the other branch.
+        mass: that a_22 is to refer to [F s^2/x].
+        shared: let both branches have the same second vertex.
+
+    Raises:
+        TensorProductError: the velocities can't be a grid.
+    """
+    return _built(mass, speeding_up, slowing_down, shared)
 
 
 def _interval_means(speed: Array, force: Array, edges: Array, least_count: int) -> Array:

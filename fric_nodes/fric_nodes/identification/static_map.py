@@ -25,18 +25,20 @@ from .free_parameters import FreeParameters
 from .result import IdentificationError, Method, Options, Score
 from .static_maps.break_away import BreakAway, break_aways, onsets
 from .static_maps.curve import Choice, Points, choose
-from .static_maps.load import LoadLaw, MeanForce, area_of, load_law
+from .static_maps.load import Line, LoadLaw, MeanForce, area_of, load_law
 from .static_maps.parts import Motion, Part, condensed, find_parts, motion_of
 from .static_maps.presliding import Compliance, Presliding, Reversal, reversals, rig_compliance, serial_mean, summary
 from .static_maps.result import StaticMap
 from .static_maps.stick_slip import StickSlip, slips, stick_slip
 from .static_maps.verdict import messages_of, status_of
+from .static_maps.weighted import as_normal
 from .verdict import warnings_of
 
 __all__ = ["METHOD", "fit", "static_map"]
 
 _FEWEST_SAMPLES = 50
 _SAME_SPEED = 0.1
+_MANY_PARTS = 6
 _OTHER_LOAD = 0.2  # of the largest
 _LOADS = ("normal_load", "pressure")
 
@@ -113,7 +115,8 @@ def _mean(look: _Look, group: list[Part], area: float) -> MeanForce:
     force = np.array([part.force for part in group])
     within = float(np.sqrt(np.mean(np.array([part.error for part in group]) ** 2) / len(group)))
     mean, between = serial_mean(force)
-    error = max(within, between) if len(group) >= 3 else within
+    # A few parts may agree by chance better than they are known; many say themselves how well.
+    error = between if len(group) >= _MANY_PARTS else max(within, between) if len(group) >= 3 else within
     load = float(np.mean([part.load for part in group]))
     thrust = area * load if area else 0.0
     drift = 0.0
@@ -150,15 +153,15 @@ def _values(choice: Choice | None, loads: LoadLaw | None) -> tuple[list[Term], d
         line = loads.line
         nominal = float(np.mean([point.load for point in loads.points]))
         level = line.intercept[0] + line.slope[0] * nominal
-        error = np.array([p.bias[1] for p in loads.points])
-        bias = float(np.average([p.bias[0] for p in loads.points], weights=1.0 / np.maximum(error, 1e-12 * abs(level)) ** 2))
+        assert loads.bias is not None
+        bias = float(loads.bias.values[0])
         share = line.slope[0] * nominal / level
         # level = F_0 + mu N_0 and share = mu N_0 / level, from the covariance of F_0 and mu.
         slope = np.array([[1.0, nominal], [-share / level, nominal * (1.0 - share) / level]])
         own = np.array([[line.intercept[1] ** 2, line.covariance], [line.covariance, line.slope[1] ** 2]])
         covariance = np.zeros((3, 3))
-        covariance[:2, :2] = slope @ own @ slope.T
-        covariance[2, 2] = float(np.var([p.bias[0] for p in loads.points], ddof=1)) / len(loads.points)
+        covariance[:2, :2] = slope @ own @ slope.T * as_normal(line.freedom) ** 2
+        covariance[2, 2] = float(loads.bias.covariance[0, 0]) * as_normal(loads.bias.freedom) ** 2
         terms = [term("coulomb", force=max(level, 0.0)), term("load_dependence", coefficient=share), term("bias", force=bias)]
         return (
             terms,
@@ -175,7 +178,8 @@ def _values(choice: Choice | None, loads: LoadLaw | None) -> tuple[list[Term], d
         grouped.setdefault(effect, {})[parameter] = value
     laws = {"stribeck": best.candidate.stribeck}
     terms = [term(effect, laws.get(effect, ""), **given) for effect, given in grouped.items()]
-    return terms, {name: (value, k) for k, (name, value) in enumerate(by_name.items())}, best.covariance
+    wide = as_normal(best.freedom) * choice.widening
+    return terms, {name: (value, k) for k, (name, value) in enumerate(by_name.items())}, best.covariance * np.outer(wide, wide)
 
 
 def _bristles(found: Sequence[Presliding], compliance: Compliance | None) -> tuple[float, float] | None:
@@ -185,6 +189,7 @@ def _bristles(found: Sequence[Presliding], compliance: Compliance | None) -> tup
     change = float(np.mean([each.change[0] for each in found]))
     if compliance is not None and compliance.told_apart and compliance.distance[0] > 0:
         distance, error = compliance.distance
+        error *= as_normal(compliance.freedom)
     else:
         distance = float(np.mean([each.distance[0] for each in found]))
         error = float(np.sqrt(np.nansum([each.distance[1] ** 2 for each in found]))) / len(found)
@@ -220,10 +225,10 @@ class _Found:
     slips: list[StickSlip]
 
 
-def _maps(looks: Sequence[_Look], load_name: str, area: tuple[float, float], mass: float) -> _Found:
+def _maps(looks: Sequence[_Look], load_name: str, area: Line | None, mass: float) -> _Found:
     """All maps that the recordings show."""
     units = looks[0].record.units
-    means = _means(looks, area[0])
+    means = _means(looks, area.slope[0] if area is not None else 0.0)
     stick: list[StickSlip] = []
     for look in looks:
         if "acceleration" in look.record.extra:
@@ -290,18 +295,17 @@ def _predicted(model: Model, found: _Found) -> Array:
     return model.value("bias.force") + np.array([mean.direction for mean in found.means]) * level
 
 
-def _looks(records: Sequence[Record], load_name: str, options: Options) -> tuple[list[_Look], tuple[float, float]]:
+def _looks(records: Sequence[Record], load_name: str, options: Options) -> tuple[list[_Look], Line | None]:
     """What is in every recording, and the area through which a pressure pushes."""
     looks = [_look(record, load_name, 0.0, options) for record in records]
-    area = (0.0, 0.0)
+    area: Line | None = None
     if load_name == "pressure":
         # The transient of the pressure after a reversal hides where the friction has settled: once more without it.
         for _ in range(2):
-            found_area = area_of(_means(looks, area[0]))
-            if found_area is None:
+            area = area_of(_means(looks, area.slope[0] if area is not None else 0.0))
+            if area is None:
                 break
-            area = found_area
-            looks = [_look(record, load_name, area[0], options) for record in records]
+            looks = [_look(record, load_name, area.slope[0], options) for record in records]
     return looks, area
 
 

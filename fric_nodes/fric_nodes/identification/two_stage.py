@@ -1,8 +1,8 @@
 """Two-stage identification: thresholds of Maxwell springs by a search, everything else inside it by linear least squares.
 
 The search is that of :mod:`.dnlrx.fit` (Amthor et al. 2008, section 3.1) and gives a DNLRX, an inverse model of filters that
-holds at one sample time. A controller or a simulation wants a mechanism, so with the thresholds found the mechanism that Eq. 8
-starts from is solved for as well:
+holds at one sample time. A controller or a simulation wants a mechanism, so with the thresholds found the mechanism that Eq.
+8 starts from is solved for as well:
 
     u = m a + sum_j c_j r_j(x, v) + sum_i k_i delta_i,   c_j linear parameters of the force terms (viscous, bias, ...),
 
@@ -11,7 +11,13 @@ term ``presliding/maxwell_slip``, and the force at which all springs slide, sum 
 plant and compensator; the DNLRX stands beside it.
 
 The structure says which force terms to fit, and, where it holds ``presliding/maxwell_slip``, how many springs; without, their
-number is chosen on held-out samples. Sliding friction that weakens with speed (Stribeck) isn't in this structure.
+number is chosen on held-out samples, and springs that the mechanism doesn't need are taken out of it again.
+
+When it can be trusted, on an axis that is made of springs (``fric bench calibration-two-stage``): springs, thresholds and
+Coulomb level at any pace of the motion; mass and viscous coefficient as far as their force stands out of what is left
+unexplained, which their standard errors say, and where it doesn't, a warning. Where friction is a smooth curve that a few
+springs only follow closely, what they leave isn't noise, and no interval covers what it puts into mass and viscous
+coefficient. Sliding friction that weakens with speed (Stribeck) isn't in this structure.
 """
 
 from __future__ import annotations
@@ -27,7 +33,7 @@ from ..model import Model, Term, term
 from ..record import Record
 from .conclusion import standard_errors
 from .dnlrx.fit import DnlrxFit, fit_prepared, name
-from .dnlrx.mechanism import Mechanism, find_mechanism
+from .dnlrx.mechanism import Mechanism, find_mechanism, without_surplus
 from .dnlrx.samples import Prepared, prepare
 from .free_parameters import FreeParameters
 from .result import Identification, IdentificationError, Method, Options
@@ -129,6 +135,8 @@ def _mechanism(
     free = FreeParameters.of(base, Options(held=options.held))
     free = free.without({held for held, linear in zip(free.names, free.linear, strict=True) if not linear})
     found = find_mechanism(base, free, prepared, dnlrx.model.thresholds)
+    if found is not None and dnlrx.trials:
+        found = without_surplus(base, free, prepared, found)
     if found is None or ("mass" in free.names and found.linear[free.names.index("mass")] <= 0.0):
         raise IdentificationError(
             records[0].source,
@@ -181,6 +189,11 @@ def _result(
         f"DNLRX {name(dnlrx.model.order)}: NOE {dnlrx.noe:.4g} % of all samples after the longest stroke, "
         f"{dnlrx.found.evaluations} trials on every {dnlrx.decimation}th sample"
     ]
+    if found.stiffness.shape[0] < dnlrx.model.order[0]:
+        notes.append(
+            f"{found.stiffness.shape[0]} of its {dnlrx.model.order[0]} springs are in the mechanism: the others only make up"
+            " for the filter, or aren't there"
+        )
     if dnlrx.trials:
         tried = ", ".join(f"{name(trial.order)} {trial.held_out_noe:.3g} %" for trial in dnlrx.trials)
         notes.append(f"orders tried, NOE on held-out samples: {tried}")

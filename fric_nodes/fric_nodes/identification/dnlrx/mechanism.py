@@ -6,7 +6,8 @@ The search for the thresholds runs on displacement and force that were low-pass 
 Eq. 11 can't be interchanged, though: a filtered displacement turns later and less sharply than the body, and the thresholds
 found from it are off by some percent where the body turns within a few periods of the cutoff. So here the deformations follow
 the displacement under a low-pass four times as wide, and are then passed through the narrow one as the force was ("parallel"
-filtering, Gautier 1997); with that, all parameters are refined by least squares within bounds, starting from the search.
+filtering, Gautier 1997); they are followed between the samples too and averaged as the force is, since a spring may turn round
+within a sample or two. With that, all parameters are refined by least squares within bounds, starting from the search.
 
 The derivative of a deformation with respect to its threshold is a state too: the direction in which the spring last slid, 1 or
 -1.
@@ -20,23 +21,27 @@ from typing import Any
 
 import numpy as np
 from scipy import signal
+from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares, lsq_linear
+from scipy.stats import chi2
 
 from ...engine.kernel import loop
 from ...model import Model
 from ...record import Array, Index
 from ..free_parameters import FreeParameters
 from ..scoring import force_along
-from ..statistics import sandwich_covariance
+from ..statistics import bartlett_lag, sandwich_covariance
 from .linear import least_squares as determined
 from .samples import FILTER_ORDER, Prepared, Samples
 
-__all__ = ["Mechanism", "find_mechanism"]
+__all__ = ["Mechanism", "find_mechanism", "without_surplus"]
 
 _WIDE = 4.0  # cutoff for the deformations over that for the force
 _WIDEST = 0.2  # of the sample rate
 _EDGE = 2.0  # periods of the cutoff that are left out after t_sl, where the filter knows nothing of before
 _CLEAR = 5.0  # residuals: a parameter whose force is smaller may be off by a fifth and more
+_BETWEEN = 4  # values of the position from one sample to the next
+_BY_CHANCE = float(chi2.ppf(0.99, 2))
 _LEAST = 1e-6  # of the strongest spring: a weaker one isn't there
 
 
@@ -54,6 +59,8 @@ class Mechanism:
         buried: numbers of those whose force isn't clearly larger than what is left unexplained. The residual of a smooth curve
             followed by a few springs isn't noise: what looks like inertia in it goes into the mass, and no standard error
             shows it.
+        cost: sum of squared residuals [F^2].
+        noise: their long-run variance [F^2].
     """
 
     linear: Array
@@ -62,22 +69,49 @@ class Mechanism:
     covariance: Array
     undetermined: tuple[int, ...]
     buried: tuple[int, ...]
+    cost: float
+    noise: float
 
 
 @loop
 def _deform_and_slope(x: Any, direction: float, thresholds: Any, bent: Any, slope: Any) -> None:
-    """Eq. 11 along ``x`` from where all springs slide, and d delta/d Delta; both ``(M, n_samples)``."""
+    """Eq. 11 along ``x`` from where all springs slide, and d delta/d Delta, as means since the last sample; both ``(M, n)``.
+
+    ``x`` has ``_BETWEEN`` values from one sample to the next, ``((n - 1) _BETWEEN + 1,)``.
+    """
     for i in range(thresholds.shape[0]):
         limit = thresholds[i]
         d, s = direction * limit, direction
         bent[i, 0], slope[i, 0] = d, s
-        for k in range(1, x.shape[0]):
-            d += x[k] - x[k - 1]
-            if d > limit:
-                d, s = limit, 1.0
-            elif d < -limit:
-                d, s = -limit, -1.0
-            bent[i, k], slope[i, k] = d, s
+        for k in range(1, bent.shape[1]):
+            mean_d, mean_s = 0.0, 0.0
+            for j in range((k - 1) * _BETWEEN + 1, k * _BETWEEN + 1):
+                mean_d += 0.5 * d
+                mean_s += 0.5 * s
+                d += x[j] - x[j - 1]
+                if d > limit:
+                    d, s = limit, 1.0
+                elif d < -limit:
+                    d, s = -limit, -1.0
+                mean_d += 0.5 * d
+                mean_s += 0.5 * s
+            bent[i, k], slope[i, k] = mean_d / _BETWEEN, mean_s / _BETWEEN
+
+
+def _as_the_force(means: Array) -> Array:
+    """From means between samples, ``(M, n)``, means over two around each, as force, velocity and acceleration of the equations.
+
+    A spring may go from one limit to the other within a sample or two. What is lost of it by reading it at samples alone is
+    half a per cent in fast turns, but five of a viscous force.
+    """
+    return np.asarray(0.5 * (means + np.concatenate([means[:, 1:], means[:, -1:]], axis=1)))
+
+
+def _finer(x: Array) -> Array:
+    """``x``, ``(n,)``, with ``_BETWEEN`` values from one sample to the next, ``((n - 1) _BETWEEN + 1,)``."""
+    at = np.arange(x.shape[0], dtype=np.float64)
+    fine = np.arange((x.shape[0] - 1) * _BETWEEN + 1) / _BETWEEN
+    return np.ascontiguousarray(CubicSpline(at, x)(fine))
 
 
 class _Problem:
@@ -98,7 +132,7 @@ class _Problem:
         every = max(int(1.0 / (4.0 * prepared.cutoff * step)), 1)
         self._rows = [np.arange(edge, part.position.shape[0] - edge, every) for part in self._parts]
         self._x = [
-            np.ascontiguousarray(signal.sosfiltfilt(wide, part.stretch.raw_position)[part.first :][: part.position.shape[0]])
+            _finer(signal.sosfiltfilt(wide, part.stretch.raw_position)[part.first :][: part.position.shape[0]])
             for part in self._parts
         ]
         self.fixed, self.force = _fixed(base, free, self._parts, self._rows)
@@ -108,11 +142,11 @@ class _Problem:
         """Deformations and their derivatives with respect to the thresholds, filtered, each ``(n_rows, M)``."""
         found: tuple[list[Array], list[Array]] = ([], [])
         for part, x, at in zip(self._parts, self._x, self._rows, strict=True):
-            shape = (thresholds.shape[0], x.shape[0])
+            shape = (thresholds.shape[0], part.position.shape[0])
             pair = np.empty(shape), np.empty(shape)
             _deform_and_slope(x, part.start.direction, np.ascontiguousarray(thresholds), *pair)
             for each, kept in zip(pair, found, strict=True):
-                kept.append(signal.sosfiltfilt(self._narrow, each, axis=1)[:, at].T)
+                kept.append(signal.sosfiltfilt(self._narrow, _as_the_force(each), axis=1)[:, at].T)
         return np.concatenate(found[0]), np.concatenate(found[1])
 
 
@@ -210,6 +244,33 @@ def _refined(
     return scaled * size, jacobian(scaled) / size, residual(scaled), inside
 
 
+def _long_run_variance(residual: Array, n_parameters: int) -> float:
+    """Of white noise whose sums would vary as those of ``residual``, ``(n,)``, do [F^2]."""
+    n = residual.shape[0]
+    energy = float(residual @ residual)
+    lags = range(1, min(bartlett_lag(residual), n - 1) + 1)
+    together = sum(float(residual[k:] @ residual[: n - k]) for k in lags)
+    return float(max(energy + 2.0 * together, energy) / max(n - n_parameters, 1))
+
+
+def _covariance(jacobian: Array, residual: Array, starts: Index) -> Array:
+    """The sandwich, and no standard error in it below that of a residual which is the same noise everywhere.
+
+    A few long strokes may decide on a parameter, and of as few the sandwich knows the variance badly: on average it is right,
+    but it is too small where it happens to be small. The other one takes the variance, and how much more the correlation in
+    time lets sums vary than white noise would, from all of the residual.
+    """
+    sandwich = sandwich_covariance(jacobian, residual, np.ones(residual.shape[0]), starts)
+    size = np.linalg.norm(jacobian, axis=0)
+    size[size == 0.0] = 1.0
+    scaled = jacobian / size
+    same = (
+        _long_run_variance(residual, jacobian.shape[1]) * np.diag(np.linalg.pinv(scaled.T @ scaled, hermitian=True)) / size**2
+    )
+    wide = np.sqrt(np.maximum(same / np.maximum(np.diag(sandwich), np.finfo(np.float64).tiny), 1.0))
+    return np.asarray(sandwich * np.outer(wide, wide))
+
+
 def _mechanism(problem: _Problem, linear: Index, n_linear: int, found: tuple[Array, Array, Array, Array]) -> Mechanism:
     """Sorted, with its covariance."""
     values, jacobian, residual, inside = found
@@ -222,9 +283,7 @@ def _mechanism(problem: _Problem, linear: Index, n_linear: int, found: tuple[Arr
     full[linear] = values[:n]
     stiffness, thresholds = values[n : n + m], values[n + m :]
     inner = np.full((values.shape[0],) * 2, np.nan)
-    inner[np.ix_(inside, inside)] = sandwich_covariance(
-        jacobian[:, inside], residual, np.ones(residual.shape[0]), problem.starts
-    )
+    inner[np.ix_(inside, inside)] = _covariance(jacobian[:, inside], residual, problem.starts)
     at = np.concatenate([linear, n_linear + np.arange(2 * m)])
     covariance = np.full((n_linear + 2 * m + 1,) * 2, np.nan)
     covariance[np.ix_(at, at)] = inner
@@ -237,4 +296,26 @@ def _mechanism(problem: _Problem, linear: Index, n_linear: int, found: tuple[Arr
     forces = np.sqrt(np.mean((jacobian[:, :n] * values[:n]) ** 2, axis=0))
     buried = tuple(int(k) for k, force in zip(linear, forces, strict=True) if force < left)
     lost = tuple(k for k in range(n_linear) if k not in set(linear.tolist()))
-    return Mechanism(full, stiffness, thresholds, covariance, lost, buried)
+    cost, noise = float(residual @ residual), _long_run_variance(residual, values.shape[0])
+    return Mechanism(full, stiffness, thresholds, covariance, lost, buried, cost, noise)
+
+
+def without_surplus(base: Model, free: FreeParameters, prepared: Prepared, found: Mechanism) -> Mechanism:
+    """``found`` less the springs that it doesn't need.
+
+    The order of a DNLRX is chosen where displacement and force are filtered alike, and in fast turns one more spring makes up
+    for what that takes away. Here nothing has to be made up for: a spring may go when its stiffness and threshold lower the sum
+    of squares by no more than two parameters do by chance. Tried are the one that is the least certain, and the smaller of the
+    two whose thresholds are the closest.
+    """
+    while found.stiffness.shape[0] > 1:
+        n = found.linear.shape[0]
+        spread = np.sqrt(np.diag(found.covariance))[n : n + found.stiffness.shape[0]]
+        sure = np.where(np.isfinite(spread) & (spread > 0.0), found.stiffness / np.maximum(spread, 1e-300), 0.0)
+        candidates = {int(np.argmin(sure)), int(np.argmin(np.diff(np.log(found.thresholds))))}
+        fewer = [find_mechanism(base, free, prepared, np.delete(found.thresholds, k)) for k in sorted(candidates)]
+        best = min((each for each in fewer if each is not None), key=lambda each: each.cost, default=None)
+        if best is None or best.cost - found.cost > _BY_CHANCE * best.noise:
+            break
+        found = best
+    return found

@@ -17,11 +17,13 @@ the surplus, and its distribution under the curve without it is drawn by simulat
 surplus stays when less than one in a hundred of these draws is as large.
 
 Source: Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (curve and its measurement); Szell, Eqs. 10 and 11; Paule and Mandel
-1982; Hurvich and Tsai 1989 (criterion); Davies 1987 and Hansen 1996 (parameter present under the alternative only).
+1982; Hurvich and Tsai 1989 (criterion); Burnham and Anderson 2002 (errors after a choice); Davies 1987 and Hansen 1996
+(parameter present under the alternative only).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -130,6 +132,8 @@ class Choice:
         all: every candidate that was possible, best first.
         p_value: probability of as much of a Stribeck effect by chance; NaN when it couldn't be tested.
         f_value: the statistic behind it.
+        widening: of the standard errors of the parameters of ``best``, for which candidate is chosen hangs on the noise too,
+            shape ``(n_parameters,)``. The force itself, which all good candidates agree on, doesn't need it.
     """
 
     best: Curve
@@ -137,6 +141,7 @@ class Choice:
     all: tuple[Curve, ...]
     p_value: float
     f_value: float
+    widening: Array
 
 
 def _fall(law: str, ratio: Array) -> Array:
@@ -305,7 +310,30 @@ def choose(points: Points, seed: int = 1) -> Choice:
     there = bool(with_it) and p_value < _SIGNIFICANT and with_it[0].criterion < without[0].criterion
     best, rival = (with_it[0], without[0]) if there else (without[0], with_it[0] if with_it else None)
     ordered = (best, *[curve for curve in found if curve is not best])
-    return Choice(best, rival, ordered, p_value, f_value)
+    return Choice(best, rival, ordered, p_value, f_value, _widening(best, with_it if there else without))
+
+
+def _widening(best: Curve, others: Sequence[Curve]) -> Array:
+    """Factors on the standard errors of the parameters of ``best`` for the choice among ``others``, shape ``(n_parameters,)``.
+
+    Each standard error becomes the mean over all candidates that have the parameter, weighted by exp(-criterion/2), of
+    sqrt(variance + (value - chosen value)^2) (Burnham and Anderson 2002, Eq. 4.9).
+    """
+    factor = np.ones(best.values.shape[0])
+    if not np.isfinite(best.criterion):
+        return factor
+    least = min(curve.criterion for curve in others)
+    for k, name in enumerate(best.candidate.names):
+        own = float(np.sqrt(best.covariance[k, k]))
+        total = spread = 0.0
+        for curve in (each for each in others if name in each.candidate.names):
+            j = curve.candidate.names.index(name)
+            weight = float(np.exp(-0.5 * (curve.criterion - least)))
+            total += weight
+            spread += weight * float(np.hypot(np.sqrt(curve.covariance[j, j]), curve.values[j] - best.values[k]))
+        if own > 0.0 and total > 0.0:
+            factor[k] = max(spread / total / own, 1.0)
+    return factor
 
 
 def _mean_only(points: Points) -> Curve:

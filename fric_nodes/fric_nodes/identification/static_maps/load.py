@@ -4,8 +4,8 @@ At each load the friction is half the difference of the mean forces forward and 
 sum. Where the load is a pressure that pushes the joint too, through an area A that need not be known, the forces are
 F_k = A p_k + b + s_k F(p): the half sums over several pressures give A and b, and A the part of the half difference that is due
 to pressures that aren't the same in both directions (a regulator that lags behind a moving piston).
-The law over the loads is a straight line F = F_0 + mu N through the points, with a scatter from recording to recording as in
-:mod:`.curve`.
+The law over the loads is a straight line F = F_0 + mu N through the points, with a scatter from recording to recording
+(:mod:`.weighted`).
 
 Source: Amontons and Coulomb; force balance of a piston, as Szell, Eq. 12.
 """
@@ -13,12 +13,13 @@ Source: Amontons and Coulomb; force balance of a piston, as Szell, Eq. 12.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
 
 from ...record import Array
+from .weighted import Weighted, weighted
 
 __all__ = ["Line", "LoadLaw", "LoadPoint", "MeanForce", "area_of", "load_law"]
 
@@ -58,7 +59,7 @@ class MeanForce:
 
 @dataclass(frozen=True)
 class Line:
-    """A straight line: intercept, slope, their standard errors, degrees of freedom, scatter about it."""
+    """A straight line: intercept, slope, their standard errors, degrees of freedom of their quantile, scatter about it."""
 
     intercept: tuple[float, float]
     slope: tuple[float, float]
@@ -101,12 +102,16 @@ class LoadLaw:
     Attributes:
         points: one per recording that has both directions, by load.
         line: through them; None with fewer than three loads.
+        bias: their common bias force [F]; None with the line.
         area: through which the load pushes, and its standard error [F per load]; zero where it doesn't.
+        area_freedom: degrees of freedom of its quantile.
     """
 
     points: tuple[LoadPoint, ...]
     line: Line | None
-    area: tuple[float, float] = field(default=(0.0, 0.0))
+    bias: Weighted | None = None
+    area: tuple[float, float] = (0.0, 0.0)
+    area_freedom: int = 1
 
 
 def _pairs(means: Sequence[MeanForce]) -> list[tuple[MeanForce, MeanForce]]:
@@ -125,52 +130,35 @@ def _pairs(means: Sequence[MeanForce]) -> list[tuple[MeanForce, MeanForce]]:
     return pairs
 
 
-def _line(x: Array, y: Array, error: Array) -> Line:
-    """Weighted straight line, with a scatter beside the errors (Paule and Mandel)."""
-    from scipy.optimize import brentq
-
-    columns = np.stack([np.ones_like(x), x / np.max(np.abs(x))], axis=1)
-    freedom = x.shape[0] - 2
-
-    def solve(tau: float) -> tuple[Array, Array, float]:
-        root = 1.0 / np.sqrt(error**2 + tau**2)
-        weighted = root[:, None] * columns
-        values = np.linalg.lstsq(weighted, root * y, rcond=None)[0]
-        return values, weighted, float(np.sum((root * y - weighted @ values) ** 2))
-
-    tau = 0.0
-    if freedom >= 1 and solve(0.0)[2] > freedom:
-        high = 10.0 * float(np.ptp(y)) + float(np.max(error))
-        tau = float(brentq(lambda t: solve(t)[2] - freedom, 0.0, high))
-    values, weighted, _ = solve(tau)
-    scale = np.array([1.0, 1.0 / np.max(np.abs(x))])
-    covariance = np.linalg.pinv(weighted.T @ weighted, hermitian=True) * np.outer(scale, scale)
-    values = values * scale
+def _line(x: Array, y: Array, error: Array, known: int) -> Line:
+    """Weighted straight line, with a scatter beside the errors; ``known`` as in :func:`.weighted.weighted`."""
+    found = weighted(np.stack([np.ones_like(x), x], axis=1), y, error, known)
+    spread = np.sqrt(np.diag(found.covariance))
     return Line(
-        (float(values[0]), float(np.sqrt(covariance[0, 0]))),
-        (float(values[1]), float(np.sqrt(covariance[1, 1]))),
-        float(covariance[0, 1]),
-        freedom,
-        tau,
+        (float(found.values[0]), float(spread[0])),
+        (float(found.values[1]), float(spread[1])),
+        float(found.covariance[0, 1]),
+        found.freedom,
+        found.scatter,
     )
 
 
-def area_of(means: Sequence[MeanForce]) -> tuple[float, float] | None:
-    """Area through which a pressure pushes, and its standard error; None where fewer than three pressures were recorded."""
+def area_of(means: Sequence[MeanForce]) -> Line | None:
+    """Mean of both directions over the pressure, whose slope is the area that it pushes on; None with fewer than three."""
     pairs = _pairs(means)
     load = np.array([0.5 * (f.load + b.load) for f, b in pairs])
     if load.shape[0] < 3 or np.ptp(load) < 0.2 * np.max(np.abs(load)):
         return None
     middle = np.array([0.5 * (f.force[0] + b.force[0]) for f, b in pairs])
     error = np.array([0.5 * np.hypot(f.force[1], b.force[1]) for f, b in pairs])
-    return _line(load, middle, error).slope
+    return _line(load, middle, error, sum(max(f.n + b.n - 2, 1) for f, b in pairs))
 
 
-def load_law(means: Sequence[MeanForce], area: tuple[float, float]) -> LoadLaw:
-    """Friction over load from means of both directions, whose thrust is taken off already."""
+def load_law(means: Sequence[MeanForce], area: Line | None) -> LoadLaw:
+    """Friction over load from means of both directions, whose thrust through ``area`` is taken off already."""
     points = []
     for forward, backward in _pairs(means):
-        by_area = 0.5 * (forward.load - backward.load) * area[1] if area[1] else 0.0
+        by_area = 0.5 * (forward.load - backward.load) * area.slope[1] if area is not None else 0.0
         error = float(np.sqrt(0.25 * (forward.force[1] ** 2 + backward.force[1] ** 2) + by_area**2))
         points.append(
             LoadPoint(
@@ -183,7 +171,10 @@ def load_law(means: Sequence[MeanForce], area: tuple[float, float]) -> LoadLaw:
         )
     points.sort(key=lambda point: point.load)
     load = np.array([point.load for point in points])
-    line = None
+    line = bias = None
     if load.shape[0] >= 3 and np.ptp(load) > 0.2 * np.max(np.abs(load)):
-        line = _line(load, np.array([p.friction[0] for p in points]), np.array([p.friction[1] for p in points]))
-    return LoadLaw(tuple(points), line, area)
+        friction, middle = (np.array([getattr(p, name) for p in points]) for name in ("friction", "bias"))
+        known = sum(point.freedom for point in points)
+        line = _line(load, friction[:, 0], friction[:, 1], known)
+        bias = weighted(np.ones((load.shape[0], 1)), middle[:, 0], middle[:, 1], known)
+    return LoadLaw(tuple(points), line, bias, *((area.slope, area.freedom) if area is not None else ()))

@@ -2,11 +2,11 @@
 
 A part is settled where the velocity, averaged over a window, keeps its sign and its value (to a tenth, or to what its own
 scatter allows) and where the force has left its transient behind: beyond half as far again as where friction has turned round
-(:func:`knee`; a thirtieth is then left of an exponential approach).
-A transient is looked for where a motion begins within the recording, not where the recording begins
-within a motion; a force that still rises in what is left hasn't settled. The load, where it is recorded, must hold too.
-Alternating sticking and slipping has a mean velocity too, but its mean force belongs to no velocity: where the speed is below
-half its mean for more than a tenth of the time, the part is named and left out.
+(:func:`knee`; a thirtieth is then left of an exponential approach), or four times as far where the way is long. Where the
+recording begins within a motion only what stands out of the scatter is a transient; a force that still rises in what is left
+hasn't settled. The load, where it is recorded, must hold too. Alternating sticking and slipping has a mean velocity too, but
+its mean force belongs to no velocity: where the speed is below half its mean for more than a tenth of the time, the part is
+named and left out.
 
 The standard error of a part's mean force is that of a long-run variance, for its residuals (ripple of the screw, control)
 are correlated in time.
@@ -36,8 +36,10 @@ _SLOW_SHARE = 0.1
 _SHORTEST = 20  # samples of a part
 _FALLEN = 0.1  # of the steepest slope: friction has turned round
 _BEYOND = 1.5  # break-away distances from a turning point to settled friction
+_FAR_BEYOND = 4.0
 _LOAD_CHANGE = 0.2  # within a part, of its mean
 _STILL_RISING = 0.1  # of the transient, left over in what follows it
+_STANDS_OUT = 6.0  # standard deviations of the settled force: a transient where the recording begins
 _CLIPPED = 0.3  # share of a part's samples at the extreme of the recording's force
 
 
@@ -200,11 +202,26 @@ def _settled_from(way: Array, force: Array) -> int:
     distance, change = knee(way, smooth)
     if not np.isfinite(distance) or change <= 0.0:
         return n
-    first = int(np.searchsorted(np.maximum.accumulate(way), _BEYOND * distance))
+    # Where the way is long, further: what is left of the transient weighs on the mean.
+    beyond = max(_BEYOND * distance, min(_FAR_BEYOND * distance, 0.5 * float(np.max(way))))
+    first = int(np.searchsorted(np.maximum.accumulate(way), beyond))
     if n - first < 4:
         return n
     rise = float(np.polyfit(np.linspace(0.0, 1.0, n - first), smooth[first:], 1)[0])
     return n if rise > _STILL_RISING * change and way[-1] < 3.0 * distance else first
+
+
+def _begun_unsettled(way: Array, force: Array) -> int:
+    """Samples to leave out of a motion that the recording begins with, which may have begun just then: 0 where it had settled.
+
+    Unlike after a reversal there may be no transient, and what looks like one must stand out of the scatter of what follows.
+    """
+    first = _settled_from(way, force)
+    rest = force[first:]
+    if 2 * first > force.shape[0] or rest.shape[0] < _SHORTEST:
+        return 0
+    rise = float(np.mean(rest)) - float(np.mean(force[: max(min(5, first // 4), 1)]))
+    return first if rise > _STANDS_OUT * float(np.std(rest)) else 0
 
 
 def _steady(motion: Motion) -> Mask:
@@ -246,6 +263,9 @@ def find_parts(record: Record, motion: Motion, load: Array | None) -> tuple[list
                 turn = turning_point(record, motion, first, sign)
                 way = sign * (record.position[turn:last] - record.position[turn])
                 skip = max(turn + _settled_from(way, sign * record.effort[turn:last]) - first, 0)
+            elif record.mask[:first].all():
+                way = sign * (record.position[:last] - record.position[0])
+                skip = max(_begun_unsettled(way, sign * record.effort[:last]) - first, 0)
             if last - first - skip < _SHORTEST:
                 notes.append(f"{where} the force doesn't settle before the motion at {sign * speed:.3g} {unit}/s ends")
                 continue

@@ -26,9 +26,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
+from scipy.optimize import isotonic_regression
 
 from ...record import Array, Record
 from .parts import Motion, Part, knee, turning_point
+from .weighted import weighted
 
 __all__ = ["LEVELS", "SHARE", "Compliance", "Presliding", "Reversal", "reversals", "rig_compliance", "serial_mean", "summary"]
 
@@ -118,7 +120,7 @@ class Compliance:
         told_apart: whether they do.
         compliance: 1/k_r [x/F] and its standard error.
         distance: L, the contact's own break-away distance [x], and its standard error.
-        freedom: of the straight line.
+        freedom: of the quantile of their intervals.
         misfit: root of its reduced sum of squares in standard errors.
         text: what it means, or why it can't be told.
     """
@@ -169,7 +171,7 @@ def reversals(record: Record, motion: Motion, parts: Sequence[Part], force: Arra
         if change <= 6.0 * part.error:
             continue
         way, share = way[:n], (towards[:n] - towards[0]) / change
-        reached = np.maximum.accumulate(share)
+        reached = _rising(share)
         if reached[-1] < LEVELS[-1]:
             continue
         half, distance = (_first(reached, way, level) for level in (0.5, SHARE))
@@ -179,6 +181,11 @@ def reversals(record: Record, motion: Motion, parts: Sequence[Part], force: Arra
             slope = float(np.polyfit(way[begins], share[begins], 1)[0]) * change
         found.append(Reversal(float(record.time[turn]), sign, change, slope, half, distance, way, share))
     return found
+
+
+def _rising(share: Array) -> Array:
+    """The nearest curve to ``share``, ``(n,)``, that doesn't fall: the largest value so far would run ahead on noise."""
+    return np.asarray(isotonic_regression(share).x)
 
 
 def _first(reached: Array, way: Array, level: float) -> float:
@@ -214,7 +221,7 @@ def summary(record: Record, load: float, found: Sequence[Reversal]) -> list[Pres
         own = [each for each in found if each.direction == sign]
         if len(own) < 2:
             continue
-        ways = np.mean([[_first(np.maximum.accumulate(e.share), e.way, x) for x in LEVELS] for e in own], axis=0)
+        ways = np.mean([[_first(_rising(e.share), e.way, x) for x in LEVELS] for e in own], axis=0)
         change = float(np.mean([each.change for each in own]))
         steepest = float(np.max(change * (LEVELS[_STEEP] - LEVELS[0]) / np.maximum(ways[_STEEP:] - ways[:-_STEEP], 1e-300)))
         stiff = np.array([each.stiffness for each in own if np.isfinite(each.stiffness) and each.stiffness > 0])
@@ -253,19 +260,15 @@ def rig_compliance(found: Sequence[Presliding], position_unit: str, force_unit: 
     change = SHARE * np.array([each.change[0] for each in found])
     way = np.array([each.distance[0] for each in found])
     error = np.array([each.distance[1] for each in found])
-    error = np.maximum(error, 0.02 * np.median(way))
     # One distance for each direction (the ends of a stroke need not be alike), one compliance.
     sides = sorted({each.direction for each in found})
     columns = np.stack([np.array([each.direction == side for each in found], dtype=np.float64) for side in sides] + [change], 1)
-    weighted = columns / error[:, None]
-    values = np.linalg.lstsq(weighted, way / error, rcond=None)[0]
-    freedom = way.shape[0] - values.shape[0]
-    misfit = float(np.sqrt(np.sum(((way - columns @ values) / error) ** 2) / max(freedom, 1)))
-    covariance = np.linalg.pinv(weighted.T @ weighted, hermitian=True) * max(misfit, 1.0) ** 2
+    fit = weighted(columns, way, error, sum(each.n - 1 for each in found))
+    values, covariance = fit.values, fit.covariance
     compliance = (float(values[-1]), float(np.sqrt(covariance[-1, -1])))
     mean = np.append(np.full(len(sides), 1.0 / len(sides)), 0.0)
     distance = (float(mean @ values), float(np.sqrt(mean @ covariance @ mean)))
-    result = Compliance(True, compliance, distance, freedom, misfit, "")
+    result = Compliance(True, compliance, distance, fit.freedom, fit.misfit, "")
     low, high = result.interval(compliance)
     own = result.interval(distance)
     unit = f"{position_unit}/{force_unit}"

@@ -106,7 +106,7 @@ def _load_messages(means: Sequence[MeanForce], loads: LoadLaw | None, load_name:
 def _interval(loads: LoadLaw) -> tuple[float, float]:
     from scipy import stats
 
-    half = float(stats.t.ppf(0.975, max(len(loads.points) - 2, 1))) * loads.area[1]
+    half = float(stats.t.ppf(0.975, max(loads.area_freedom, 1))) * loads.area[1]
     return loads.area[0] - half, loads.area[0] + half
 
 
