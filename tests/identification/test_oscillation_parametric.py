@@ -1,4 +1,4 @@
-"""Mass from runs with different feedback: de Marchi's formulas on exact numbers, then recordings, then forced runs."""
+"""Mass from runs with different feedback: de Marchi's formulas on exact numbers, then recordings."""
 
 from __future__ import annotations
 
@@ -7,18 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fric_nodes.identification import METHODS
-from fric_nodes.identification.parametric_oscillation import (
-    Forced,
-    forced_mechanics,
-    forced_response,
-    parametric_mechanics,
-)
+from fric_nodes.identification.parametric_oscillation import parametric_mechanics
 from fric_nodes.identification.result import IdentificationError, Options
 from fric_nodes.identification.start import start_model
 from fric_nodes.model import build_model, term
-from fric_nodes.record import Record, Units
+from fric_nodes.record import Units
 from fric_nodes.verification.free_oscillation_reference import INERTIA, PENDULUMS, STIFFNESS, Pendulum, gain, recorded, swing
-from scipy.integrate import solve_ivp
 
 M, C, K = 2.0, 3.0, 50.0
 SMALL = np.diag([1e-4, 1e-5]) ** 2
@@ -130,6 +124,26 @@ def test_gains_are_found_from_the_recorded_force() -> None:
     assert any("from the recorded force" in note for note in result.notes)
 
 
+@pytest.mark.parametrize("hold", ["preceding", "following"])
+def test_a_held_force_is_half_a_sample_off_its_stamp(hold: str) -> None:
+    """A stiffness P that is taken half a sample late would look like a damping of P h/2, half of the axis' own here."""
+    records = []
+    for number, proportional in enumerate((60.0, 240.0)):
+        total = K + proportional
+        w = np.sqrt(total / M)
+        record = recorded(
+            swing(Pendulum(float(w), float(C / (2.0 * M * w)) / 10.0, 0.0, 1.5 / total, 0.0), 1.0), number, step=0.0
+        )
+        h, x = record.sample_time, record.position
+        between = 0.5 * (x[1:] + x[:-1])
+        held = -proportional * (np.append(between, x[-1]) if hold == "following" else np.insert(between, 0, x[0]))
+        assert h * 240.0 > 0.5 * C / 10.0
+        records.append(replace(record, effort=held, effort_hold=hold, source=f"gain {proportional:g}"))
+    result = METHODS["parametric-oscillation"].fit(_structure(), records, Options())  # type: ignore[arg-type]
+    assert result.model.value("mass") == pytest.approx(M, rel=0.005)
+    assert result.model.value("viscous.coefficient") == pytest.approx(C / 10.0, rel=0.05)
+
+
 def test_the_own_feedback_of_a_plant_counts_as_one() -> None:
     """The pendulum plant has its gains inside: what is left of the stiffness is the spring's."""
     p = PENDULUMS["#1"]
@@ -143,65 +157,3 @@ def test_the_own_feedback_of_a_plant_counts_as_one() -> None:
     result = METHODS["log-decrement"].fit(model, [recorded(swing(p, 1.5), 0)], Options())
     assert result.model.value("stiffness.stiffness") == pytest.approx(0.3 * total, rel=1e-3)
     assert result.model.value("inertia") == INERTIA
-
-
-# ---- forced oscillation ----------------------------------------------------------------------------------------------
-
-
-def _forced(frequency: float, force: float, dry: float, hold: str = "linear") -> Record:
-    """Steady response to a sine, dry friction smoothed over 1e-3 of the velocity, integrated by an implicit method."""
-    step, periods = 2.0 * np.pi / frequency / 400.0, 40
-    time = step * np.arange(400 * periods)
-
-    def right_side(t: float, y: np.ndarray) -> list[float]:
-        friction = dry * np.tanh(y[1] / (1e-3 * force / (M * frequency)))
-        return [y[1], (force * np.sin(frequency * t) - C * y[1] - K * y[0] - friction) / M]
-
-    answer = solve_ivp(right_side, (0.0, time[-1] + step), [0.0, 0.0], method="LSODA", rtol=1e-8, atol=1e-10, t_eval=time)
-    late = {"linear": 0.0, "following": 0.5}[hold] * step
-    effort = force * np.sin(frequency * (time + late))
-    return Record(time, answer.y[0], effort, effort_hold=hold).slice(400 * 30, 400 * periods)
-
-
-@pytest.mark.parametrize("hold", ["linear", "following"])
-def test_the_dynamic_stiffness_of_a_linear_axis(hold: str) -> None:
-    for frequency in (2.0, 5.0, 9.0):
-        response = forced_response(_forced(frequency, 4.0, 0.0, hold), frequency)
-        assert response.stiff == pytest.approx(K - M * frequency**2, abs=0.01)
-        assert response.lossy == pytest.approx(C * frequency, abs=0.01)
-
-
-def test_forced_runs_give_mass_damping_stiffness_and_friction() -> None:
-    runs = [(3.0, 8.0), (4.0, 14.0), (6.5, 10.0), (8.0, 20.0)]
-    found = forced_mechanics([forced_response(_forced(w, b, 1.0), w) for w, b in runs])
-    assert found.mass == pytest.approx(M, rel=0.01)
-    assert found.stiffness == pytest.approx(K, rel=0.01)
-    # The describing function takes the motion for a sine.
-    assert found.viscous == pytest.approx(C, rel=0.05)
-    assert found.coulomb == pytest.approx(1.0, rel=0.1)
-    # Without the dry term the damping holds the friction too, as the printed formula does.
-    blind = forced_mechanics([forced_response(_forced(w, b, 1.0), w) for w, b in runs], coulomb=False)
-    assert blind.viscous > 1.1 * C
-
-
-def test_the_printed_formulas_of_the_forced_parametric_oscillation() -> None:
-    """Two runs with P and D of their own: the closed forms with D_i w_i where the slide has D_i."""
-    gains, frequencies = [(20.0, 1.0), (70.0, 4.0)], [3.0, 7.0]
-    runs = [
-        Forced(w, 1.0, K + p - M * w**2, (C + d) * w, 1e-6 * np.eye(2)) for w, (p, d) in zip(frequencies, gains, strict=True)
-    ]
-    found = forced_mechanics(runs, gains, coulomb=False)
-    (wi, wj), (i, j) = frequencies, runs
-    mass = ((20.0 - i.stiff) - (70.0 - j.stiff)) / (wi**2 - wj**2)
-    viscous = ((i.lossy - 1.0 * wi) * wj + (j.lossy - 4.0 * wj) * wi) / (2.0 * wi * wj)
-    assert (found.mass, found.viscous, found.stiffness) == pytest.approx((mass, viscous, K), rel=1e-9)
-    assert mass == pytest.approx(M, rel=1e-12)
-
-
-def test_forced_runs_that_are_alike() -> None:
-    same = Forced(3.0, 1.0, 10.0, 5.0, np.eye(2))
-    with pytest.raises(IdentificationError) as caught:
-        forced_mechanics([same, same, same])
-    assert "too much alike" in str(caught.value)
-    with pytest.raises(IdentificationError):
-        forced_response(Record(np.arange(10.0) * 0.1, np.ones(10), np.ones(10)), 1.0)

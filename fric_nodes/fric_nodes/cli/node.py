@@ -12,7 +12,7 @@ from ..errors import InputError
 
 __all__ = ["NODES", "register"]
 
-NODES = ("plant", "excitation", "identifier", "compensator", "pid", "recorder", "player")
+NODES = ("plant", "excitation", "identifier", "compensator", "pid", "recorder", "player", "experiment", "monitor")
 
 
 def register(app: typer.Typer) -> None:

@@ -13,14 +13,6 @@ errors (friction is seldom the same twice) these are widened, the frequencies' a
 leave, so that a damping that varies doesn't spoil a mass that the frequencies show. Without a spring of its own (k = 0) one
 run with a feedback is enough.
 
-Forced runs, F = B sin(w t), response of amplitude C that lags by phi, R = B/C, the feedback not in F:
-
-    R cos phi = k + P - m w^2,    R sin phi = (c + D) w + 4 F_C/(pi C)
-
-(linear in m, k, c, F_C: least squares over all runs). Corrected in the slide: the damping formula needs D_i w_i in place of
-D_i; it holds for different w_i only, where m is concerned; and the describing function of dry friction, the last term, is
-missing there, so that its c holds what friction takes at that amplitude.
-
 Source: de Marchi 1998 (parametric harmonic oscillation).
 """
 
@@ -35,36 +27,16 @@ from scipy.optimize import least_squares
 from ..model import Model
 from ..record import Array, Record
 from .log_decrement import log_decrement
+from .mechanics import Mechanics
 from .oscillation.conclusion import PHYSICAL, asked_of, closing, constant_force, oscillations
 from .oscillation.recording import Oscillation
 from .oscillation.result import FreeOscillation
+from .oscillation_effort import at_stamps
 from .result import Identification, IdentificationError, Method, Options
 
-__all__ = ["METHOD", "Forced", "Mechanics", "fit", "forced_mechanics", "forced_response", "parametric_mechanics"]
+__all__ = ["METHOD", "Mechanics", "fit", "parametric_mechanics"]
 
 _DIFFERENT = 3.0  # standard errors by which runs must differ to show a mass
-
-
-@dataclass(frozen=True)
-class Mechanics:
-    """Mass, viscous coefficient, stiffness and Coulomb force with their covariance, in this order.
-
-    Attributes:
-        mass: [F s^2/x].
-        viscous: c [F s/x].
-        stiffness: k [F/x].
-        coulomb: F_C [F]; NaN where it isn't asked for.
-        covariance: shape ``(4, 4)``; zero for what was held.
-        misfit: by how many standard errors the runs differ: their frequencies and dampings, or both parts of their dynamic
-            stiffness; taken into account in the covariance where above 1.
-    """
-
-    mass: float
-    viscous: float
-    stiffness: float
-    coulomb: float
-    covariance: Array
-    misfit: tuple[float, float]
 
 
 def _weighted(
@@ -172,92 +144,6 @@ def parametric_mechanics(
 
 
 @dataclass(frozen=True, eq=False)
-class Forced:
-    """Response of an axis to a sinusoidal force.
-
-    Attributes:
-        frequency: w [rad/s].
-        amplitude: C of the position [x].
-        stiff: R cos phi [F/x].
-        lossy: R sin phi [F/x].
-        covariance: of ``stiff`` and ``lossy``, shape ``(2, 2)``.
-    """
-
-    frequency: float
-    amplitude: float
-    stiff: float
-    lossy: float
-    covariance: Array
-
-
-def forced_response(record: Record, frequency: float) -> Forced:
-    """Dynamic stiffness of a steady forced run at ``frequency`` [rad/s], from the first harmonics of force and position.
-
-    Raises:
-        IdentificationError: shorter than two periods.
-    """
-    if record.duration * frequency < 4.0 * np.pi:
-        raise IdentificationError(record.source, "shorter than two periods of the force", "record for longer")
-    angle = frequency * record.time
-    columns = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
-    # A force held from its stamp to the next is centred half a sample later.
-    late = {"following": 0.5, "preceding": -0.5, "linear": 0.0}[record.effort_hold] * record.sample_time * frequency
-    parts, noise = [], []
-    for values in (record.effort, record.position):
-        answer, *_ = np.linalg.lstsq(columns, values, rcond=None)
-        left = values - columns @ answer
-        n = 2 * int(record.duration * frequency / (2.0 * np.pi))
-        # What is left repeats itself with the period (friction's harmonics): half periods count, not samples.
-        blocks = left[: left.shape[0] // n * n].reshape(n, -1).mean(axis=1)
-        noise.append(2.0 * (float(np.var(left)) / left.shape[0] + float(np.var(blocks)) / n))
-        parts.append(complex(answer[0], -answer[1]))
-    force, position = parts[0] * np.exp(-1j * late), parts[1]
-    ratio = force / position
-    variance = (noise[0] + abs(ratio) ** 2 * noise[1]) / abs(position) ** 2
-    return Forced(frequency, abs(position), float(ratio.real), float(ratio.imag), variance * np.eye(2))
-
-
-def forced_mechanics(
-    runs: Sequence[Forced], gains: Sequence[tuple[float, float]] | None = None, coulomb: bool = True, source: str = "recordings"
-) -> Mechanics:
-    """Mass, viscous coefficient, stiffness and Coulomb force from forced runs.
-
-    Args:
-        runs: at different frequencies; for ``coulomb`` at different amplitudes or frequencies.
-        gains: P [F/x] and D [F s/x] of a feedback that isn't part of the force, for each run; None: there is none.
-        coulomb: whether to fit dry friction too.
-        source: for messages.
-
-    Raises:
-        IdentificationError: the runs don't differ enough.
-    """
-    known = np.zeros((len(runs), 2)) if gains is None else np.array(gains, dtype=np.float64)
-    w = np.array([run.frequency for run in runs])
-    dry = np.array([4.0 / (np.pi * run.amplitude) for run in runs])
-    zero, one = np.zeros_like(w), np.ones_like(w)
-    upper = np.stack([-(w**2), zero, one, zero], axis=1)
-    lower = np.stack([zero, w, zero, dry], axis=1)
-    columns = np.concatenate([upper, lower])[:, : 4 if coulomb else 3]
-    data = np.concatenate([[r.stiff for r in runs] - known[:, 0], [r.lossy for r in runs] - known[:, 1] * w])
-    weight = 1.0 / np.sqrt(np.concatenate([[r.covariance[0, 0] for r in runs], [r.covariance[1, 1] for r in runs]]))
-    scaled = columns * weight[:, None]
-    size = np.linalg.norm(scaled, axis=0)
-    if np.linalg.matrix_rank(scaled / size, tol=1e-6) < columns.shape[1]:
-        raise IdentificationError(
-            source, "the forced runs are too much alike", "force it at different frequencies and with different amplitudes"
-        )
-    answer, *_ = np.linalg.lstsq(scaled, data * weight, rcond=None)
-    left = data * weight - scaled @ answer
-    freedom = data.shape[0] - columns.shape[1]
-    apart = float(left @ left) / freedom if freedom else 1.0
-    n = columns.shape[1]
-    whole = np.zeros((4, 4))
-    whole[:n, :n] = np.linalg.inv(scaled.T @ scaled) * max(apart, 1.0)
-    level = float(answer[3]) if coulomb else float("nan")
-    return Mechanics(float(answer[0]), float(answer[1]), float(answer[2]), level, whole, (float(np.sqrt(apart)),) * 2)
-
-
-@dataclass(frozen=True, eq=False)
 class _Runs:
     """Several oscillations with their natural parameters, and how they are weighted."""
 
@@ -342,6 +228,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     """
     spring = any(held.effect.id == "stiffness" for held in structure.terms)
     asked = asked_of(structure, records[0].source, spring)
+    records = [at_stamps(record) for record in records]
     found = oscillations(structure, records, options, judge=False)
     results = [log_decrement(each, asked) for each in found]
     runs = _Runs(found, results, spring, structure.value("stiffness.position") if spring else 0.0)

@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
@@ -38,10 +38,15 @@ class OrderlyNode(Node):
         """
 
 
-def run(name: str, make: Callable[[], OrderlyNode], args: list[str] | None = None) -> None:
+def run(
+    name: str,
+    make: Callable[[], OrderlyNode],
+    args: list[str] | None = None,
+    kind: Callable[[], Executor] = SingleThreadedExecutor,
+) -> None:
     """Serve the node that ``make`` makes until it is done, or SIGINT or SIGTERM comes: exit status 0.
 
-    An input that cannot be used is one line, which begins with ``name``, and exit status 2.
+    An input that cannot be used is one line, which begins with ``name``, and exit status 2. ``kind`` makes the executor.
     """
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -49,7 +54,7 @@ def run(name: str, make: Callable[[], OrderlyNode], args: list[str] | None = Non
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = make()
-        executor = SingleThreadedExecutor()
+        executor = kind()
         executor.add_node(node)
         try:
             while not (stop.is_set() or node.done):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["use_realtime_scheduling"]
+__all__ = ["use_normal_scheduling", "use_realtime_scheduling"]
 
 
 def use_realtime_scheduling(priority: int) -> str:
@@ -22,3 +22,9 @@ def use_realtime_scheduling(priority: int) -> str:
     except OSError as error:
         return f"normal: SCHED_FIFO was refused ({error.strerror}); see ulimit -r"
     return f"SCHED_FIFO {priority}"
+
+
+def use_normal_scheduling() -> None:
+    """Put the calling thread under normal scheduling: one that a real-time thread starts would be as urgent as that."""
+    if hasattr(os, "sched_setscheduler"):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -1,0 +1,1 @@
+"""Experiments that conduct themselves: excite, record, identify, choose the next setting; no ROS in here."""
