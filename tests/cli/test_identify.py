@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ time:     {from: t, unit: ms}
 position: {from: x, unit: mm}
 effort:   {from: volts, scale: 2.5, unit: N}
 """
+LIMITS = ("--limit", "position=-0.05,0.05", "--limit", "speed=0.3", "--limit", "force=-60,60")
 MASS, COULOMB, VISCOUS, BIAS = 3.0, 6.0, 25.0, 1.5
 
 
@@ -75,6 +77,10 @@ def test_identify_finds_the_parameters_and_writes_three_files(bag: Path, tmp_pat
         assert 0 < found["parameters"][name]["std"] < 0.05 * value
     assert found["parameters"]["mass"]["unit"] == "kg"
     assert found["validation"] is None
+    foreseen = found["identifiability"]
+    assert set(foreseen["parameters"]) == set(truth)
+    assert not any(finding["serious"] for finding in foreseen["findings"])
+    assert {each["verdict"] for each in found["checks"]} <= {"ok", "warning", "unknown"}
     assert {path.name for path in (tmp_path / "found").iterdir()} == {"model.yaml", "identification.json", "report.html"}
     page = (tmp_path / "found" / "report.html").read_text()
     assert "http://" not in page.split("</script>")[-1], "the page must open without a network"
@@ -108,6 +114,15 @@ def test_validation_is_scored_apart(bag: Path, tmp_path: Path) -> None:
         (("identify", "{bag}", "--cutoff", "900"), "cutoff"),
         (("identify", "{bag}", "--cutoff", "-1"), "--cutoff"),
         (("identify", "{bag}", "--hold", "weight"), "weight"),
+        (("identify", "{bag}", "--bound", "weight=0,1"), "weight"),
+        (("identify", "{bag}", "--bound", "mass=2,1"), "--bound"),
+        (("identify", "{bag}", "--bound", "mass=-2,-1"), "leaves nothing"),
+        (("identify", "{bag}", "--starts", "0"), "--starts"),
+        (("identify",), "no recording"),
+        (("identify", "{bag}", "--design"), "not limited"),
+        (("identify", "{bag}", "--limit", "speed=1"), "--design"),
+        (("identify", "--design", *LIMITS), "--model"),
+        (("identify", "--design", *LIMITS, "--rig", "period=0"), "--rig"),
         (("identify", "{bag}", "--model", "nowhere.yaml"), "nowhere.yaml"),
         (("identify", "{bag}", "--topic", "joint_states"), "--topic"),
         (("model", "show", "nowhere.yaml"), "nowhere.yaml"),
@@ -123,6 +138,54 @@ def test_what_cannot_be_used_is_refused_in_one_line(arguments: tuple[str, ...], 
         filled += ["--out", str(out)]
     assert says in refusal(*filled)
     assert not out.exists(), "a refused command must leave nothing behind"
+
+
+def test_bounds_are_kept(bag: Path, tmp_path: Path) -> None:
+    done = fric("identify", bag, "--bound", "mass=0.5,2", "--out", tmp_path, "--json")
+    assert done.returncode == 0, done.stderr
+    assert 0.5 <= json.loads(done.stdout)["parameters"]["mass"]["value"] <= 2.0
+
+
+def test_what_a_recording_cannot_tell_is_said_before_the_fit(csv: Path, tmp_path: Path) -> None:
+    """The same slide going one way only: Coulomb friction and bias are one constant."""
+    time = np.arange(0.0, 6.0, 1e-3)
+    w = 2.0 * np.pi * 0.7
+    position, velocity = 0.05 * time - 0.005 * np.cos(w * time), 0.05 + 0.005 * w * np.sin(w * time)
+    force = MASS * 0.005 * w**2 * np.cos(w * time) + VISCOUS * velocity + COULOMB + BIAS
+    force += np.random.default_rng(3).normal(0.0, 0.2, time.shape)
+    path = tmp_path / "run.csv"
+    np.savetxt(path, np.c_[1e3 * time, 1e3 * position, force / 2.5], delimiter=",", header="t,x,volts", comments="")
+    (tmp_path / "map.yaml").write_text(MAP)
+    assert fric("import", path, "--map", tmp_path / "map.yaml", "--out", tmp_path / "bag").returncode == 0
+    done = fric("identify", tmp_path / "bag", "--out", tmp_path / "found", "--json")
+    assert done.returncode == 0, done.stderr
+    lines = done.stderr.splitlines()
+    warned = next(k for k, line in enumerate(lines) if "coulomb.force and bias.force can't be told apart" in line)
+    assert warned < next(k for k, line in enumerate(lines) if line.startswith("fitting"))
+    coupled = [each for each in json.loads(done.stdout)["identifiability"]["findings"] if each["kind"] == "coupled"]
+    assert coupled[0]["parameters"] == ["coulomb.force", "bias.force"]
+    assert coupled[0]["experiment"]["kind"] in coupled[0]["message"]
+    assert escape(coupled[0]["message"]) in (tmp_path / "found" / "report.html").read_text()
+
+
+def test_a_design_from_a_model_alone_writes_what_the_excitation_node_takes(tmp_path: Path) -> None:
+    model = tmp_path / "model.yaml"
+    model.write_text(
+        "format: fric-model/1\njoint: slide\nunits: {position: m, force: N}\nplant: {type: rigid, mass: 2.0}\n"
+        "terms:\n  - {effect: coulomb, force: 10.0}\n  - {effect: viscous, coefficient: 35.0}\n"
+    )
+    out = tmp_path / "next"
+    done = fric(
+        "identify", "--design", *LIMITS, "--duration", 3, "--model", model, "--rig", "force_noise=0.3", "--out", out, "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)["design"]
+    assert found["worst_relative_error"]["after"] < 0.1
+    assert {path.name for path in out.iterdir()} == {"design.json", "excitation.yaml", "design.html"}
+    assert json.loads((out / "design.json").read_text()) == found
+    written = (out / "excitation.yaml").read_text()
+    assert "joint: slide" in written
+    assert all(each["kind"] in written for each in found["excitation"])
 
 
 def test_a_mapping_that_does_not_fit_names_the_columns(csv: Path, tmp_path: Path) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError
+from .identify_shown import print_design, print_intervals, print_result, summary_of, uncertainty_json
 from .options import (
     EndOption,
     JointOption,
@@ -26,14 +27,18 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..identification.result import Identification, Options, Score
-    from ..identification.uncertainty import Uncertainty
+    from ..identification.design import Limits, Rig
+    from ..identification.identifiability import Foreseen
+    from ..identification.result import Identification, Method, Options
+    from ..instrument import Finding
     from ..model import Model
     from ..record import Record
 
 __all__ = ["register"]
 
 _DEFAULT_TERMS = "coulomb,viscous,bias"
+_DURATION = 20.0
+_PERIOD = 0.002
 
 
 def register(app: typer.Typer) -> None:
@@ -44,7 +49,9 @@ def register(app: typer.Typer) -> None:
 
 
 def identify(
-    train: Annotated[list[Path], typer.Argument(help="Recordings to fit: rosbag2 folders or files.")],
+    train: Annotated[
+        list[Path] | None, typer.Argument(help="Recordings to fit: rosbag2 folders or files. None with --design and --model.")
+    ] = None,
     out: OutOption = Path("identified"),
     validate: Annotated[
         list[Path] | None, typer.Option("--validate", help="Recording kept apart from the fit; may be repeated.")
@@ -87,6 +94,30 @@ def identify(
             "--uncertainty", help="Intervals by sandwich (standard errors), bootstrap, or profile; empty: errors only."
         ),
     ] = "",
+    bound: Annotated[
+        list[str] | None, typer.Option("--bound", help="Keep a parameter between limits, NAME=LO,HI; may be repeated.")
+    ] = None,
+    starts: Annotated[int, typer.Option("--starts", help="Starts of the search of output-error; the best end is taken.")] = 1,
+    design: Annotated[
+        bool, typer.Option("--design", help="Propose the next excitation: the one that most reduces the worst uncertainty.")
+    ] = False,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option("--limit", help="Limit of the next excitation: position=LO,HI, speed=V and force=LO,HI; all three."),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option("--duration", help=f"Longest next recording with --design [s]; {_DURATION:g}.")
+    ] = None,
+    rig: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rig",
+            help="Without recordings, how the next one is made: period=S, resolution=X, position_noise=X, force_noise=F.",
+        ),
+    ] = None,
+    tries: Annotated[
+        int, typer.Option("--tries", help="Settings of each excitation that --design looks at first; more take longer.")
+    ] = 6,
     repair: RepairOption = False,
     time: TimeOption = "stamp",
     start: StartOption = None,
@@ -98,39 +129,52 @@ def identify(
     from ..identification.equations import nominal_conditions
     from ..identification.result import Options
 
-    _check(cutoff, decimation, rest_velocity, horizon)
+    _check(cutoff, decimation, rest_velocity, horizon, starts, tries)
+    given = train or []
+    gains, bounds = _gains(gain or [], len(given)), _bounds(bound or [])
     options = Options(
-        cutoff, decimation, rest_velocity, tuple(hold or ()), tuple(free or ()), robust, horizon, _gains(gain or [], len(train))
+        cutoff, decimation, rest_velocity, tuple(hold or ()), tuple(free or ()), robust, horizon, gains, bounds, starts
     )
+    limits, chosen = _limits(design, limit or [], duration), _method(method)
+    if not given:
+        _design_alone(model, limits, _rig(rig or []), chosen, options, out, as_json, tries)
+        return
     reading = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
     kept_apart = validate or []
-    _refuse_overlap(train, kept_apart)
-    progress(f"reading {len(train) + len(kept_apart)} recording(s)")
-    records = read_all(train, reading)
+    _refuse_overlap(given, kept_apart)
+    progress(f"reading {len(given) + len(kept_apart)} recording(s)")
+    records = read_all(given, reading)
     validation = read_all(kept_apart, reading)
     structure = _structure(model, terms, records[0])
     # What a load or a temperature is relative to belongs to the model: a recording under another load has another mean.
     structure = replace(structure, nominal=nominal_conditions(records) | dict(structure.nominal))
     records, validation = ([replace(each, nominal=structure.nominal) for each in held] for held in (records, validation))
-    progress(f"fitting {', '.join(structure.names)} by {method}")
-    result = _fit(method, structure, records, validation, options)
-    summary = _summary(result)
+    checks = _inspect(records)
+    result = replace(_fit(chosen, structure, records, validation, options, experiments=not design), checks=checks)
+    summary = summary_of(result)
     if uncertainty:
         from ..identification.uncertainty import assess
 
         progress(f"finding intervals by {uncertainty}")
         found = assess(result, records, options, uncertainty)
-        summary["uncertainty"] = _uncertainty_json(found)
+        summary["uncertainty"] = uncertainty_json(found)
     _write(out, result, records, validation, options, summary)
+    if not as_json:
+        print_result(result, out)
+        if uncertainty:
+            print_intervals(found, structure)
+    if limits is not None:
+        summary["design"] = _design(result.model, result, records, limits, None, chosen, options, out, as_json, tries)
     if as_json:
         typer.echo(json.dumps(summary))
-    else:
-        _print(result, out)
-        if uncertainty:
-            _print_intervals(found, structure)
 
 
-def _check(cutoff: float | None, decimation: int | None, rest_velocity: float | None, horizon: float | None) -> None:
+def _check(
+    cutoff: float | None, decimation: int | None, rest_velocity: float | None, horizon: float | None, starts: int, tries: int
+) -> None:
+    for name, number in (("--starts", starts), ("--tries", tries)):
+        if number < 1:
+            raise InputError(name, f"is {number}", "give 1 or more")
     given = {"--cutoff": cutoff, "--decimation": decimation, "--rest-velocity": rest_velocity, "--horizon": horizon}
     for name, value in given.items():
         lowest = 0.0 if name == "--rest-velocity" else 1e-12
@@ -154,6 +198,57 @@ def _gains(given: list[str], n_recordings: int) -> tuple[tuple[float, float], ..
     return tuple(found)
 
 
+def _bounds(given: list[str]) -> tuple[tuple[str, float, float], ...]:
+    """Name and limits of each parameter, from texts such as ``stribeck.velocity=0.001,0.05``."""
+    found = []
+    for text in given:
+        name, _, numbers = text.partition("=")
+        try:
+            low, high = (float(part) for part in numbers.split(","))
+        except ValueError:
+            low = high = math.nan
+        if not low < high:
+            raise InputError("--bound", f"is '{text}'", "give NAME=LO,HI, such as stribeck.velocity=0.001,0.05")
+        found.append((name, low, high))
+    return tuple(found)
+
+
+def _method(name: str) -> Method:
+    from ..identification import METHODS
+
+    if name not in METHODS:
+        raise InputError("--method", f"'{name}' is not known", f"use one of {', '.join(METHODS)}")
+    return METHODS[name]
+
+
+def _limits(design: bool, given: list[str], duration: float | None) -> Limits | None:
+    """The limits of the next recording, or None when none is asked for."""
+    from ..identification.design import Limits
+
+    if not design:
+        if given or duration is not None:
+            raise InputError("--limit/--duration", "belong to --design", "add --design")
+        return None
+    return Limits.parsed(given, _DURATION if duration is None else duration)
+
+
+def _rig(given: list[str]) -> Rig:
+    """How the next recording is made, from texts such as ``resolution=1e-6``."""
+    from ..identification.design import Rig
+
+    found = {"period": _PERIOD}
+    for text in given:
+        name, _, number = text.partition("=")
+        try:
+            found[name] = float(number)
+        except ValueError:
+            found[name] = math.nan
+        known = name in Rig.__dataclass_fields__
+        if not known or not math.isfinite(found[name]) or found[name] < 0.0 or found["period"] == 0.0:
+            raise InputError("--rig", f"is '{text}'", f"give NAME=NUMBER with {', '.join(Rig.__dataclass_fields__)}")
+    return Rig(**found)
+
+
 def _refuse_overlap(train: list[Path], validation: list[Path]) -> None:
     same = {path.resolve() for path in train} & {path.resolve() for path in validation}
     if same:
@@ -171,16 +266,50 @@ def _structure(model: Path | None, terms: str, record: Record) -> Model:
     return start_model(names, record.joint, record.units)
 
 
-def _fit(method: str, structure: Model, records: list[Record], validation: list[Record], options: Options) -> Identification:
-    from ..identification import METHODS
+def _inspect(records: list[Record]) -> tuple[Finding, ...]:
+    """What is wrong with the recordings themselves, said before anything is fitted."""
+    from ..instrument import inspect
+
+    progress("looking for faults of the recordings")
+    findings = inspect(records)
+    for finding in findings:
+        if finding.verdict in ("warning", "fault"):
+            progress(f"{finding.verdict}: {finding.detail}{'; ' + finding.remedy if finding.remedy else ''}")
+    return findings
+
+
+def _foresee(structure: Model, records: list[Record], options: Options, method: Method, experiments: bool) -> Foreseen | None:
+    """What the recordings can tell, said before the fit; None where the method sees something else, or nothing can be said."""
+    from ..identification.identifiability import foresee
+
+    if not method.predicts:
+        return None
+    progress("asking what the recordings can tell")
+    try:
+        found = foresee(structure, records, options, method.predicts, experiments)
+    except InputError:
+        return None  # the fit will say it
+    for line in found.warnings:
+        progress(f"before the fit: {line}")
+    return found
+
+
+def _fit(
+    method: Method,
+    structure: Model,
+    records: list[Record],
+    validation: list[Record],
+    options: Options,
+    experiments: bool,
+) -> Identification:
     from ..identification.scoring import score
 
-    if method not in METHODS:
-        raise InputError("--method", f"'{method}' is not known", f"use one of {', '.join(METHODS)}")
-    result = METHODS[method].fit(structure, records, options)
+    foreseen = _foresee(structure, records, options, method, experiments)
+    progress(f"fitting {', '.join(structure.names)} by {method.id}")
+    result = replace(method.fit(structure, records, options), foreseen=foreseen)
     provenance = {
         "recordings": ", ".join(record.source for record in records),
-        "method": method,
+        "method": method.id,
         "equations": str(result.train.n_samples),
     }
     result = replace(result, model=replace(result.model, provenance=provenance))
@@ -189,36 +318,6 @@ def _fit(method: str, structure: Model, records: list[Record], validation: list[
         notes += result.remarks_on(validation)
         result = replace(result, validation=score(result.model, validation, options), notes=(*result.notes, *notes))
     return result
-
-
-def _score_json(score: Score | None) -> dict[str, float | None] | None:
-    """A score; what a method has no figure for is null."""
-    return None if score is None else {name: value if math.isfinite(value) else None for name, value in asdict(score).items()}
-
-
-def _summary(result: Identification) -> dict[str, Any]:
-    """The JSON object of the contract."""
-    return {
-        "parameters": {
-            p.name: {
-                "value": p.value,
-                "std": result.model.standard_errors.get(p.name) if p.name in result.fitted else None,
-                "unit": p.declaration.unit(result.model.units),
-                "fitted": p.name in result.fitted,
-            }
-            for p in result.model.parameters()
-        },
-        "method": result.method,
-        "train": _score_json(result.train),
-        "validation": _score_json(result.validation),
-        "correlation": {
-            "parameters": list(result.fitted),
-            "matrix": [[None if math.isnan(value) else value for value in row] for row in result.correlation.tolist()],
-        },
-        "status": result.status,
-        "warnings": list(result.warnings),
-        "notes": list(result.notes),
-    }
 
 
 def _write(
@@ -231,16 +330,10 @@ def _write(
 ) -> None:
     """Every result, or none: all are made before the first is written."""
     from ..files import write_text
-    from ..identification.static_maps.result import StaticMap
     from ..model_file import write_model
-    from ..report.identification import identification_report
-    from ..report.static_map import static_map_report
 
     attachments = result.attachments
-    if isinstance(result, StaticMap):
-        page = static_map_report(result)
-    else:
-        page = identification_report(result, records, validation, options)
+    page = result.page(records, validation, options)
     write_text(out / "identification.json", json.dumps(summary, indent=2) + "\n")
     write_model(result.model, out / "model.yaml")
     for name, text in attachments.items():
@@ -248,77 +341,51 @@ def _write(
     write_text(out / "report.html", page)
 
 
-def _uncertainty_json(found: Uncertainty) -> dict[str, Any]:
-    """Intervals by parameter; null where there is no limit, or no second recording."""
+def _design_alone(
+    path: Path | None, limits: Limits | None, rig: Rig, method: Method, options: Options, out: Path, as_json: bool, tries: int
+) -> None:
+    """A design without recordings, from the values of a model file."""
+    from ..model_file import read_model
 
-    def number(value: float) -> float | None:
-        return value if math.isfinite(value) else None
+    if limits is None:
+        raise InputError("fric identify", "no recording is given", "name one, or design the first with --design and --model")
+    if path is None:
+        raise InputError("--design", "neither recordings nor a model are given", "give --model with values near the machine's")
+    summary = _design(read_model(path), None, [], limits, rig, method, options, out, as_json, tries)
+    if as_json:
+        typer.echo(json.dumps({"design": summary}))
 
-    return {
-        "kind": found.kind,
-        "probability": found.probability,
-        "parameters": {
-            name: {
-                "std": number(float(found.standard_errors[k])),
-                "lower": number(float(found.lower[k])),
-                "upper": number(float(found.upper[k])),
-                "std_over_restarts": number(float(found.restarts[k])),
-                "std_over_recordings": number(float(found.recordings[k])),
-            }
-            for k, name in enumerate(found.names)
-        },
-        "notes": list(found.notes),
+
+def _design(
+    model: Model,
+    first: Identification | None,
+    records: list[Record],
+    limits: Limits,
+    rig: Rig | None,
+    method: Method,
+    options: Options,
+    out: Path,
+    as_json: bool,
+    tries: int,
+) -> dict[str, Any]:
+    """Propose the next excitation, and write design.json, excitation.yaml and design.html."""
+    from ..files import write_text
+    from ..identification.design import problem_for, propose, rig_of
+    from ..report.design import design_report
+
+    if not method.predicts:
+        raise InputError("--design", f"not to be had for the method '{method.id}'", "use inverse-dynamics or prediction-error")
+    made = rig_of(records) if rig is None else rig
+    problem, notes = problem_for(model, first, records, options, limits, made, method.predicts)
+    found = propose(problem, n_each=tries, n_refining=12 * tries, notes=notes, progress=progress)
+    summary = found.summary()
+    texts = {
+        "design.json": json.dumps(summary, indent=2) + "\n",
+        "excitation.yaml": found.parameters_file(model.joint),
+        "design.html": design_report(found),
     }
-
-
-def _print_intervals(found: Uncertainty, model: Model) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    shown = Table(
-        box=None, pad_edge=False, title=f"{found.kind}: {100 * found.probability:g} % intervals", title_justify="left"
-    )
-    shown.add_column("parameter")
-    for column in ("from", "to", "std over restarts", "over recordings"):
-        shown.add_column(column, justify="right")
-    shown.add_column("unit")
-    for k, name in enumerate(found.names):
-        numbers = (found.lower[k], found.upper[k], found.restarts[k], found.recordings[k])
-        texts = [f"{value:.5g}" if math.isfinite(value) else "-" for value in numbers]
-        shown.add_row(name, *texts, model.unit(name))
-    console = Console()
-    console.print(shown)
-    for line in found.notes:
-        console.print(f"- {line}", highlight=False, markup=False)
-
-
-def _print(result: Identification, out: Path) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console()
-    shown = Table(box=None, pad_edge=False)
-    shown.add_column("parameter")
-    for column in ("value", "standard error"):
-        shown.add_column(column, justify="right")
-    shown.add_column("unit")
-    for parameter in result.model.parameters():
-        error = result.model.standard_errors.get(parameter.name)
-        text = "held" if parameter.name not in result.fitted else "not known" if error is None else f"{error:.2g}"
-        shown.add_row(parameter.name, f"{parameter.value:.6g}", text, parameter.declaration.unit(result.model.units))
-    console.print(shown)
-    units = result.model.units
-    for name, score in (("train", result.train), ("validation", result.validation)):
-        if score is not None:
-            run = (
-                f", free-run position RMSE {score.position_rmse:.3g} {units.position}"
-                if math.isfinite(score.position_rmse)
-                else ""
-            )
-            force = f"relative force error {score.relative_force_error_percent:.2f} %, NOE {score.noe:.4f} %"
-            console.print(f"{name}: {force}{run}", highlight=False)
-    for line in (*result.notes, *result.warnings):
-        console.print(f"- {line}", highlight=False, markup=False)
-    console.print(f"status: {result.status}", highlight=False, markup=False)
-    written = ", ".join([str(out / "model.yaml"), *result.attachments, "identification.json", "report.html"])
-    console.print(f"written: {written}", highlight=False, markup=False)
+    for name, text in texts.items():
+        write_text(out / name, text)
+    if not as_json:
+        print_design(found, out, list(texts))
+    return summary

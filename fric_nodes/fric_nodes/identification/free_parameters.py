@@ -42,11 +42,11 @@ class FreeParameters:
         """All parameters of ``model`` but those held by the options and shape parameters that were not freed.
 
         Raises:
-            InputError: an option names a parameter that the model doesn't have.
+            InputError: an option names a parameter that the model doesn't have, or bounds that leave nothing between them.
         """
-        for name in (*options.held, *options.freed):
+        for name in (*options.held, *options.freed, *(bound[0] for bound in options.bounds)):
             if name not in model.names:
-                raise InputError("--hold/--free", f"no parameter '{name}'", f"choose from {', '.join(model.names)}")
+                raise InputError("--hold/--free/--bound", f"no parameter '{name}'", f"choose from {', '.join(model.names)}")
         free = [
             (number, parameter)
             for number, parameter in enumerate(model.parameters())
@@ -54,13 +54,19 @@ class FreeParameters:
         ]
         declared = [parameter.declaration for _, parameter in free]
         tiny = np.finfo(np.float64).tiny
-        return cls(
-            np.array([number for number, _ in free], dtype=np.int64),
-            np.array([d.linear for d in declared], dtype=np.bool_),
-            np.array([max(d.lower, tiny) if d.positive else d.lower for d in declared]),
-            np.array([d.upper for d in declared]),
-            tuple(parameter.name for _, parameter in free),
-        )
+        lower = np.array([max(d.lower, tiny) if d.positive else d.lower for d in declared])
+        upper = np.array([d.upper for d in declared])
+        names = tuple(parameter.name for _, parameter in free)
+        for name, low, high in options.bounds:
+            if name in names:
+                k = names.index(name)
+                lower[k], upper[k] = max(lower[k], low), min(upper[k], high)
+                if not lower[k] < upper[k]:
+                    allowed = f"[{declared[k].lower:g}, {declared[k].upper:g}]"
+                    problem = f"{low:g} to {high:g} leaves nothing of what {name} may be, {allowed}"
+                    raise InputError("--bound", problem, "give the lower bound first, and bounds that overlap with it")
+        index = np.array([number for number, _ in free], dtype=np.int64)
+        return cls(index, np.array([d.linear for d in declared], dtype=np.bool_), lower, upper, names)
 
     def without(self, names: set[str]) -> FreeParameters:
         """The rest when ``names`` are held as well."""
@@ -86,8 +92,10 @@ class FreeParameters:
             tried = candidates(declared[int(self.index[k])].declaration.dimension, equations, level)
             value = declared[int(self.index[k])].value
             if tried.size:
-                lower[k] = max(lower[k], min(0.1 * float(tried[0]), value))
-                upper[k] = min(upper[k], max(10.0 * float(tried[-1]), value))
+                low = max(lower[k], min(0.1 * float(tried[0]), value))
+                high = min(upper[k], max(10.0 * float(tried[-1]), value))
+                if low < high:  # bounds that someone gave may lie beyond all reach, and then they are meant
+                    lower[k], upper[k] = low, high
         return FreeParameters(self.index, self.linear, lower, upper, self.names)
 
     def at_bound(self, model: Model) -> Mask:

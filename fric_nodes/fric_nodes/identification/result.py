@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError
 from ..model import Model
 from ..record import Array, Record
+
+if TYPE_CHECKING:
+    from ..instrument import Finding
+    from .identifiability import Foreseen
 
 __all__ = ["Identification", "IdentificationError", "Method", "Options", "Score"]
 
@@ -31,6 +36,11 @@ class Options:
         robust: weigh down outliers (Huber) instead of plain least squares.
         horizon: length of the free runs of an output-error fit [s]; None: the whole recording in one run.
         gains: P [F/x] and D [F s/x] of the feedback under which each recording was made, for oscillations; empty: not given.
+        bounds: limits of parameters, ``(name, lower, upper)``, inside those that they are declared with.
+        starts: number of starts of a search; the best end of all is taken.
+        start_states: where the runs of an output-error fit start: ``measured``, as filtered; ``tied`` to that by its error;
+            ``free``. Empty: measured for a whole recording, free for shorter runs.
+        continuity: weight of the jumps from the end of one of these runs to the start of the next; 0: they may jump.
     """
 
     cutoff: float | None = None
@@ -41,6 +51,10 @@ class Options:
     robust: bool = False
     horizon: float | None = None
     gains: tuple[tuple[float, float], ...] = ()
+    bounds: tuple[tuple[str, float, float], ...] = ()
+    starts: int = 1
+    start_states: str = ""
+    continuity: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -76,6 +90,8 @@ class Identification:
         notes: what was dropped or left out of the recordings, and why.
         train: score on the recordings that were fitted.
         validation: score on recordings that no fit has seen, or None.
+        foreseen: what was known before the fit about what the recordings can tell, or None.
+        checks: what was found about the recordings themselves.
     """
 
     model: Model
@@ -87,6 +103,8 @@ class Identification:
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     validation: Score | None = None
+    foreseen: Foreseen | None = None
+    checks: tuple[Finding, ...] = ()
 
     @property
     def correlation(self) -> Array:
@@ -99,6 +117,18 @@ class Identification:
     def attachments(self) -> Mapping[str, str]:
         """What a method has found besides the model: texts of files to write beside it, by name."""
         return {}
+
+    def page(self, records: Sequence[Record], validation: Sequence[Record], options: Options) -> str:
+        """The report as a page of its own.
+
+        Args:
+            records: the recordings that were fitted.
+            validation: recordings kept apart; may be empty.
+            options: as in the fit.
+        """
+        from ..report.identification import identification_report  # a fit itself draws nothing
+
+        return identification_report(self, records, validation, options)
 
     def remarks_on(self, validation: Sequence[Record]) -> tuple[str, ...]:
         """What the method has to say about recordings that the fit has not seen, besides the model's score."""
@@ -115,6 +145,8 @@ class Method:
         needs: which experiment it needs.
         source: paper.
         fit: structure (a model whose values are the start), recordings and options to a result.
+        predicts: what it compares with the recording sample by sample, for statements before a fit: ``force`` along the motion,
+            ``position`` from one sample to the next; empty where a fit sees something else.
     """
 
     id: str
@@ -122,3 +154,4 @@ class Method:
     needs: str
     source: str
     fit: Callable[[Model, Sequence[Record], Options], Identification] = field(repr=False)
+    predicts: str = ""

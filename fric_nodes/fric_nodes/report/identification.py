@@ -13,19 +13,13 @@ from ..model import Model
 from ..model_file import model_to_text
 from ..record import Array, Record
 from ..simulate import predict_force
+from .checks import checks_section
 from .figures import Curve, scatter_and_curves, stacked
+from .identifiability import identifiability_section
+from .numbers import significant
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 
 __all__ = ["friction_curve", "identification_report", "parameter_table", "significant"]
-
-
-def significant(value: float, digits: int = 4) -> str:
-    """``value`` with so many significant digits, without an exponent where it reads well."""
-    if not np.isfinite(value):
-        return "not known"
-    if value == 0.0 or 1e-3 <= abs(value) < 1e6:
-        return f"{value:#.{digits}g}".rstrip(".") if abs(value) < 10**digits else f"{value:.0f}"
-    return f"{value:.{digits - 1}e}"
 
 
 def friction_curve(model: Model, velocity: Array) -> Array:
@@ -184,6 +178,11 @@ def identification_report(
     if validation:
         sections.append(_force_section("validation recording", result.model, equations(list(validation), options)))
     sections.append(_correlation_section(result))
+    if result.foreseen is not None:
+        names = {p.name: p.declaration.unit(result.model.units) for p in result.model.parameters()}
+        sections.append(identifiability_section(result.foreseen, names))
+    if result.checks:
+        sections.append(checks_section(result.checks, [record.source for record in train]))
     remarks = [*result.warnings, *result.notes]
     if remarks:
         sections.append(Section("What to know", (bullets(remarks),)))

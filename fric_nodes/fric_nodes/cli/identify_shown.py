@@ -1,0 +1,157 @@
+"""What ``fric identify`` says: one JSON object for programs, a table and the remarks for people."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..identification.design import Proposal
+    from ..identification.result import Identification, Score
+    from ..identification.uncertainty import Uncertainty
+    from ..model import Model
+
+__all__ = ["print_design", "print_intervals", "print_result", "summary_of", "uncertainty_json"]
+
+
+def _score_json(score: Score | None) -> dict[str, float | None] | None:
+    """A score; what a method has no figure for is null."""
+    return None if score is None else {name: value if math.isfinite(value) else None for name, value in asdict(score).items()}
+
+
+def summary_of(result: Identification) -> dict[str, Any]:
+    """The JSON object of the contract."""
+    return {
+        "parameters": {
+            p.name: {
+                "value": p.value,
+                "std": result.model.standard_errors.get(p.name) if p.name in result.fitted else None,
+                "unit": p.declaration.unit(result.model.units),
+                "fitted": p.name in result.fitted,
+            }
+            for p in result.model.parameters()
+        },
+        "method": result.method,
+        "train": _score_json(result.train),
+        "validation": _score_json(result.validation),
+        "correlation": {
+            "parameters": list(result.fitted),
+            "matrix": [[None if math.isnan(value) else value for value in row] for row in result.correlation.tolist()],
+        },
+        "status": result.status,
+        "warnings": list(result.warnings),
+        "notes": list(result.notes),
+        "checks": [finding.as_json() for finding in result.checks],
+        "identifiability": None if result.foreseen is None else result.foreseen.summary(),
+    }
+
+
+def uncertainty_json(found: Uncertainty) -> dict[str, Any]:
+    """Intervals by parameter; null where there is no limit, or no second recording."""
+
+    def number(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return {
+        "kind": found.kind,
+        "probability": found.probability,
+        "parameters": {
+            name: {
+                "std": number(float(found.standard_errors[k])),
+                "lower": number(float(found.lower[k])),
+                "upper": number(float(found.upper[k])),
+                "std_over_restarts": number(float(found.restarts[k])),
+                "std_over_recordings": number(float(found.recordings[k])),
+            }
+            for k, name in enumerate(found.names)
+        },
+        "notes": list(found.notes),
+    }
+
+
+def print_intervals(found: Uncertainty, model: Model) -> None:
+    """The intervals as a table."""
+    from rich.console import Console
+    from rich.table import Table
+
+    shown = Table(
+        box=None, pad_edge=False, title=f"{found.kind}: {100 * found.probability:g} % intervals", title_justify="left"
+    )
+    shown.add_column("parameter")
+    for column in ("from", "to", "std over restarts", "over recordings"):
+        shown.add_column(column, justify="right")
+    shown.add_column("unit")
+    for k, name in enumerate(found.names):
+        numbers = (found.lower[k], found.upper[k], found.restarts[k], found.recordings[k])
+        texts = [f"{value:.5g}" if math.isfinite(value) else "-" for value in numbers]
+        shown.add_row(name, *texts, model.unit(name))
+    console = Console()
+    console.print(shown)
+    for line in found.notes:
+        console.print(f"- {line}", highlight=False, markup=False)
+
+
+def print_result(result: Identification, out: Path) -> None:
+    """Values, scores, remarks, and what was written."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    shown = Table(box=None, pad_edge=False)
+    shown.add_column("parameter")
+    for column in ("value", "standard error"):
+        shown.add_column(column, justify="right")
+    shown.add_column("unit")
+    for parameter in result.model.parameters():
+        error = result.model.standard_errors.get(parameter.name)
+        text = "held" if parameter.name not in result.fitted else "not known" if error is None else f"{error:.2g}"
+        shown.add_row(parameter.name, f"{parameter.value:.6g}", text, parameter.declaration.unit(result.model.units))
+    console.print(shown)
+    units = result.model.units
+    for name, score in (("train", result.train), ("validation", result.validation)):
+        if score is not None:
+            run = (
+                f", free-run position RMSE {score.position_rmse:.3g} {units.position}"
+                if math.isfinite(score.position_rmse)
+                else ""
+            )
+            force = f"relative force error {score.relative_force_error_percent:.2f} %, NOE {score.noe:.4f} %"
+            console.print(f"{name}: {force}{run}", highlight=False)
+    for line in (*result.notes, *result.warnings):
+        console.print(f"- {line}", highlight=False, markup=False)
+    console.print(f"status: {result.status}", highlight=False, markup=False)
+    written = ", ".join([str(out / "model.yaml"), *result.attachments, "identification.json", "report.html"])
+    console.print(f"written: {written}", highlight=False, markup=False)
+
+
+def print_design(found: Proposal, out: Path, written: list[str]) -> None:
+    """The excitations proposed, and what they are expected to bring."""
+    from rich.console import Console
+    from rich.table import Table
+
+    problem = found.problem
+    console = Console()
+    for part in found.parts:
+        settings = ", ".join(f"{name} {value:.4g}" for name, value in part.values.items())
+        console.print(f"{part.kind.title}, {part.duration:.3g} s ({part.kind.id}: {settings})", highlight=False, markup=False)
+    shown = Table(box=None, pad_edge=False)
+    shown.add_column("parameter")
+    for column in ("value", "error so far", "expected", "with a multisine"):
+        shown.add_column(column, justify="right")
+    shown.add_column("unit")
+    before, after = found.before, found.after(found.trial.best)
+    generic = None if found.generic is None else found.after(found.generic)
+    for k, name in enumerate(problem.free.names):
+        numbers = [before[k], after[k], math.inf if generic is None else generic[k]]
+        texts = [f"{value:.2g}" if math.isfinite(value) else "not known" for value in numbers]
+        value = problem.model.values[problem.free.index[k]]
+        shown.add_row(name, f"{value:.5g}", *texts, problem.model.unit(name))
+    console.print(shown)
+    for line in found.notes:
+        console.print(f"- {line}", highlight=False, markup=False)
+    for path in written:
+        console.print(f"written: {out / path}", highlight=False, markup=False)
+    play = f"ros2 run fric_nodes excitation --ros-args --params-file {out / 'excitation.yaml'}"
+    console.print(f"play it: {play}", highlight=False, markup=False, soft_wrap=True)

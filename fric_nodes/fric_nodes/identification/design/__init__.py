@@ -1,0 +1,12 @@
+"""Experiment design: the next excitation, within limits, that most reduces the worst uncertainty of a model's parameters.
+
+``limits`` says what to keep within, ``settings`` what is worth trying, ``trial`` what one excitation is worth, ``search`` finds
+the best, ``proposal`` starts from a fit and writes the result down.
+"""
+
+from __future__ import annotations
+
+from .limits import DesignError, Limits, Rig, rig_of
+from .proposal import Proposal, problem_for, propose
+
+__all__ = ["DesignError", "Limits", "Proposal", "Rig", "problem_for", "propose", "rig_of"]
