@@ -36,10 +36,10 @@ def test_six_parameters_on_25000_samples_take_about_a_second_at_most(slider: Any
     record = slider.record(noise=0.05, resolution=1e-6)
     model = structure(term("stribeck", force=0.5, velocity=0.05))
     FIT(model, [record], Options())  # compiles, or loads what was compiled
-    start = time.perf_counter()
+    start = time.process_time()
     found = FIT(model, [record], Options())
-    # Generous, for a busy machine: one that evaluates too often takes several times as long.
-    assert time.perf_counter() - start < 6.0
+    # Of the processor, which other programs do not count in: one that evaluates too often takes several times as long.
+    assert time.process_time() - start < 3.0
     assert found.model.value("mass") == pytest.approx(2.0, rel=0.05)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from ..registry import discover
 from .benchmark import Benchmark
 
-__all__ = ["BENCHMARKS"]
+__all__ = ["BENCHMARKS", "Benchmark"]
 
 BENCHMARKS: dict[str, Benchmark] = {benchmark.id: benchmark for benchmark in discover(__name__, "BENCHMARK", Benchmark)}
 """Every benchmark by its id."""

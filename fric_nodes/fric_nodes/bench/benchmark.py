@@ -36,8 +36,16 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Benchmark:
-    """One benchmark; ``run`` gives its figures."""
+    """One benchmark.
+
+    Attributes:
+        id: name on the command line.
+        title: what is measured, in a few words.
+        run: gives its figures.
+        long: takes minutes: run only when named, or with all the others when all are asked for.
+    """
 
     id: str
     title: str
     run: Callable[[], list[Figure]]
+    long: bool = False

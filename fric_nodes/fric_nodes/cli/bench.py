@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import InputError
 from .options import JsonOption, progress
+
+if TYPE_CHECKING:
+    from ..bench import Benchmark
 
 __all__ = ["register"]
 
@@ -19,7 +23,11 @@ def register(app: typer.Typer) -> None:
 
 
 def bench(
-    names: Annotated[list[str] | None, typer.Argument(help="Which benchmarks; all when none is named.")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Which benchmarks; all but the long ones when none is named.")
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="All, the long ones too.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="Say what can be measured, and measure nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed on this machine; exit status 1 when a goal is missed."""
@@ -28,7 +36,10 @@ def bench(
 
     from ..bench import BENCHMARKS
 
-    chosen = names or list(BENCHMARKS)
+    if listed:
+        _list(list(BENCHMARKS.values()), as_json)
+        return
+    chosen = names or [name for name, benchmark in BENCHMARKS.items() if everything or not benchmark.long]
     for name in chosen:
         if name not in BENCHMARKS:
             raise InputError("fric bench", f"no benchmark '{name}'", f"choose from {', '.join(BENCHMARKS)}")
@@ -52,5 +63,17 @@ def bench(
             unit = "" if figure.unit == "1" else f" {figure.unit}"
             table.add_row(figure.name, f"{figure.value:.4g}{unit}", f"{figure.goal}{unit}{mark}" if figure.goal else "")
         Console(highlight=False).print(table)
+    left_out = [name for name in BENCHMARKS if name not in chosen] if not names else []
+    if left_out:
+        progress(f"left out, since they take long: {', '.join(left_out)} (name them, or --all)")
     if any(figure.reached is False for figure in figures):
         raise typer.Exit(1)
+
+
+def _list(benchmarks: Sequence[Benchmark], as_json: bool) -> None:
+    """Print the names of ``benchmarks``, what they measure, and which are long."""
+    if as_json:
+        typer.echo(json.dumps([{"name": each.id, "title": each.title, "long": each.long} for each in benchmarks]))
+        return
+    for each in benchmarks:
+        typer.echo(f"{each.id:24}{each.title}{' (long)' if each.long else ''}")

@@ -1,30 +1,70 @@
 """From a recording to the equations of inverse dynamics: filtered motion, matching force, decimated, edges and rest marked.
 
-The position is low-pass filtered without phase (Butterworth, forward and backward) and differentiated by central
-differences; the force is shifted to the sample's own instant according to how the recording holds it; both sides of u =
-f(q, v, a) then pass the same zero-phase decimation filter, so that no phase comes between them (the "parallel decimation"
-of Gautier 1997).
+The position is low-pass filtered without phase (Butterworth, forward and backward) and differentiated; the force passes the
+same filter. Both sides of u = f(q, v, a) are means over the two intervals around a sample: the force according to how the
+recording holds it, the velocity by its central difference, the acceleration by that of a velocity of fourth order. Then both
+pass the same decimation filter, so that no phase and no gain comes between them (the "parallel decimation" of Gautier 1997).
+
+Where the joint sticks, a static law leaves the friction open, and a low-pass carries what it happens to be into the rows
+around. The decimation filter is therefore a window of finite length (Parzen's, two row times wide), and ``clear`` marks the
+rows within whose window the joint doesn't rest: at these a static law and its sgn(v) hold from end to end, reversals included.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from scipy import signal
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
 
-from ..record import Array, Mask, Record, RecordError
+from ..model import Model
+from ..record import Array, Index, Mask, Record, RecordError
 from .result import IdentificationError, Options
+from .statistics import noise_of
 
-__all__ = ["Equations", "Stretch", "at_rest", "equations", "nominal_conditions", "surroundings"]
+__all__ = ["FINER", "Equations", "Motion", "Stretch", "at_rest", "equations", "nominal_conditions", "surroundings"]
+
+FINER = 4
+"""Steps per sample of the motion that friction states are led along."""
 
 _FILTER_ORDER = 4
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
 _MIN_ROWS = 20
 _REST_TIME = 0.015  # [s] slower than the limit before it counts as rest
 _REST_ROWS = 2
+_WINDOW_BAND = 0.6  # of the row rate: band of white noise of as much power in the derivative
+_MARGIN = 0.25  # of the cutoff's period: how far the filter on the position carries a rest
+_FEW = 0.1  # share of the sliding rows, in each direction, below which clear ones can't stand for them
+_HIGHEST = 0.36  # of the sampling rate: cutoff where bristles are to be seen and the position is quiet enough
+_QUIET = 2e-4  # noise of the velocity beside its own root mean square
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion sampled at even steps; arrays of shape ``(n,)``, or one value for load and temperature.
+
+    Attributes:
+        time: [s].
+        step: [s].
+        position: [x].
+        velocity: [x/s].
+        acceleration: [x/s^2].
+        load: relative normal load [1].
+        temperature: [K] from reference.
+    """
+
+    time: Array
+    step: float
+    position: Array
+    velocity: Array
+    acceleration: Array
+    load: Array
+    temperature: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +79,11 @@ class Stretch:
         velocity: [x/s].
         acceleration: [x/s^2].
         effort: force as recorded [F].
-        force: force at the samples' own instants [F].
+        force: mean force over the two intervals around each sample [F].
         hold: how the recording holds its force.
         load: relative normal load [1], one value or ``(n,)``.
         temperature: [K] from reference, one value or ``(n,)``.
+        smooth: the filter that the position went through.
     """
 
     time: Array
@@ -56,6 +97,32 @@ class Stretch:
     hold: str
     load: Array
     temperature: Array
+    smooth: Callable[[Array], Array]
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The motion at the samples."""
+        parts = (self.position, self.velocity, self.acceleration, self.load, self.temperature)
+        return Motion(self.time, self.sample_time, *parts)
+
+    @cached_property
+    def fine_motion(self) -> Motion:
+        """The motion at the middle of each of :data:`FINER` steps per interval between samples, for what depends on its path.
+
+        Between two samples a contact may turn from one direction to the other; a velocity held around a sample would take that
+        away.
+        """
+        h = self.sample_time
+        fine = h / FINER
+        path = CubicSpline(self.time, self.position)
+        edges = self.time[0] + fine * np.arange((self.time.shape[0] - 1) * FINER + 1)
+        load, temperature = (
+            np.repeat(each[:-1], FINER) if each.shape[0] > 1 else each for each in (self.load, self.temperature)
+        )
+        middle = edges[:-1] + 0.5 * fine
+        return Motion(
+            middle, fine, path(middle), np.diff(path(edges)) / fine, np.diff(path(edges, 1)) / fine, load, temperature
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +137,11 @@ class Equations:
         time: at the rows [s].
         starts: first row of each stretch.
         sliding: False where the joint rests, so that the row tells nothing about sliding friction.
+        clear: True where the joint doesn't rest as long as the row's window lasts; the same as ``sliding`` where hardly any row
+            is so.
         rest_velocity: speed below which it may be at rest [x/s].
         notes: what was left out, and why.
+        cutoff: of the filter on the position [Hz].
     """
 
     stretches: tuple[Stretch, ...]
@@ -79,64 +149,53 @@ class Equations:
     force: Array
     velocity: Array
     time: Array
-    starts: Array
+    starts: Index
     sliding: Mask
+    clear: Mask
     rest_velocity: float
     notes: tuple[str, ...]
+    cutoff: float = 0.0
 
     def rows(self, of_stretch: Callable[[Stretch], Array]) -> Array:
         """A full-rate quantity of every stretch, thinned out and joined, shape ``(n_rows, ...)``."""
         return np.concatenate([self.thin(stretch, of_stretch(stretch)) for stretch in self.stretches])
 
 
-def equations(records: list[Record], options: Options) -> Equations:
+def equations(records: list[Record], options: Options, model: Model | None = None) -> Equations:
     """The equations of ``records``.
+
+    Args:
+        records: what was measured.
+        options: of the filters.
+        model: to be fitted; one with slip dynamics gets a cutoff as high as the noise of the position lets it be.
 
     Raises:
         IdentificationError: nothing usable is left.
     """
     notes: list[str] = []
-    stretches: list[Stretch] = []
     rate = 1.0 / max(record.sample_time for record in records)
-    cutoff = min(0.1 * rate, 100.0) if options.cutoff is None else options.cutoff
-    if not 0 < cutoff < 0.5 * rate:
-        raise IdentificationError(
-            records[0].source,
-            f"cutoff of {cutoff:g} Hz for a recording at {rate:.4g} Hz",
-            f"choose a cutoff between 0 and {0.5 * rate:.4g} Hz",
-        )
-    decimation = max(round(rate / cutoff), 1) if options.decimation is None else options.decimation
+    even = [_even(record, notes) for record in records]
+    cutoff, decimation = _filter(records[0].source, even, options, rate, model is not None and model.has_slip_dynamics)
     edge = int(np.ceil(_EDGE_PERIODS / cutoff * rate))
-    for record in records:
-        notes += [f"{record.source}: {note}" for note in record.notes]
-        even = record.uniform()
-        if even is not record:
-            irregular = float(np.max(np.abs(np.diff(record.time) - record.sample_time)))
-            notes.append(f"{record.source}: uneven stamps (up to {1e3 * irregular:.2f} ms off) interpolated to an even grid")
-        stretches += _stretches(even, cutoff, edge, notes)
+    stretches = [stretch for record in even for stretch in _stretches(record, cutoff, edge, notes)]
     if not stretches:
         raise IdentificationError(
             ", ".join(record.source for record in records),
             f"no valid part is longer than {(2 * edge + _MIN_ROWS * decimation) / rate:.2f} s",
             "record for longer, or raise the cutoff",
         )
-    sos = signal.cheby1(8, 0.05, 0.8 / decimation, output="sos") if decimation > 1 else None
-
-    def thin(stretch: Stretch, values: Array) -> Array:
-        smooth: Array = values if sos is None else signal.sosfiltfilt(sos, values, axis=0)
-        return smooth[edge : values.shape[0] - edge : decimation]
-
-    force = [thin(stretch, stretch.force) for stretch in stretches]
+    thin = partial(_thin, edge, decimation)
+    force = [thin(stretch, stretch.smooth(stretch.force)) for stretch in stretches]
     velocity = np.concatenate([thin(stretch, stretch.velocity) for stretch in stretches])
     # Taken as they are: a time stamp needs no filter.
     time = np.concatenate([s.time[edge : s.time.shape[0] - edge : decimation] for s in stretches])
-    starts = np.cumsum([0, *(part.shape[0] for part in force[:-1])])
-    rest = options.rest_velocity
-    if rest is None:
+    starts: Index = np.cumsum([0, *(part.shape[0] for part in force[:-1])], dtype=np.int64)
+    rest = still = options.rest_velocity
+    if rest is None or still is None:
         # Below its own noise a velocity says nothing, however slow the rest of the recording is.
-        band = min(cutoff, 0.4 * rate / decimation)
-        noise = max(_velocity_noise(stretch, band) for stretch in stretches)
-        rest = max(0.02 * float(np.quantile(np.abs(velocity), 0.98)), 4.0 * noise)
+        rest = 0.02 * float(np.quantile(np.abs(velocity), 0.98))
+        still = max(rest, _unclear(stretches, cutoff))
+        rest = max(rest, _unclear(stretches, min(cutoff, _WINDOW_BAND * rate / decimation)))
     resting = [at_rest(part, rest, decimation / rate) for part in np.split(velocity, starts[1:])]
     sliding = ~np.concatenate(resting)
     rest_time = float(np.sum(~sliding)) * decimation / rate
@@ -144,7 +203,83 @@ def equations(records: list[Record], options: Options) -> Equations:
         notes.append(
             f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) don't count for sliding friction"
         )
-    return Equations(tuple(stretches), thin, np.concatenate(force), velocity, time, starts, sliding, rest, tuple(notes))
+    reach = (decimation if decimation > 1 else 0) + int(np.ceil(_MARGIN / cutoff * rate))
+    rested = [
+        _near(at_rest(s.velocity, still, s.sample_time), reach)[edge : s.time.shape[0] - edge : decimation] for s in stretches
+    ]
+    clear = sliding & ~np.concatenate(rested)
+    if not _can_stand_for(clear, sliding, velocity):
+        clear = sliding
+        notes.append(
+            "rests follow each other too closely for the filter: equations that they reach into are used too; record longer "
+            "strokes, or raise the cutoff"
+        )
+    return Equations(
+        tuple(stretches), thin, np.concatenate(force), velocity, time, starts, sliding, clear, rest, tuple(notes), cutoff
+    )
+
+
+def _even(record: Record, notes: list[str]) -> Record:
+    """``record`` on an even grid, with what was done to it said in ``notes``."""
+    notes += [f"{record.source}: {note}" for note in record.notes]
+    even = record.uniform()
+    if even is not record:
+        irregular = float(np.max(np.abs(np.diff(record.time) - record.sample_time)))
+        notes.append(f"{record.source}: uneven stamps (up to {1e3 * irregular:.2f} ms off) interpolated to an even grid")
+    return even
+
+
+def _filter(source: str, records: Sequence[Record], options: Options, rate: float, slips: bool) -> tuple[float, int]:
+    """Cutoff [Hz] and decimation."""
+    cutoff = options.cutoff
+    if cutoff is None:
+        cutoff = min(0.1 * rate, 100.0)
+        if slips:
+            cutoff = max(cutoff, min(_HIGHEST * rate, *(_quiet_band(record) for record in records)))
+    if not 0 < cutoff < 0.5 * rate:
+        raise IdentificationError(
+            source,
+            f"cutoff of {cutoff:g} Hz for a recording at {rate:.4g} Hz",
+            f"choose a cutoff between 0 and {0.5 * rate:.4g} Hz",
+        )
+    return cutoff, max(round(rate / cutoff), 1) if options.decimation is None else options.decimation
+
+
+def _quiet_band(record: Record) -> float:
+    """Cutoff up to which noise of the position is a small share of the velocity [Hz]."""
+    noise = noise_of(record.position[record.mask]) + 1e-13 * float(np.max(np.abs(record.position)))
+    speed = float(np.sqrt(np.mean(np.gradient(record.position[record.mask], record.sample_time) ** 2)))
+    return float((_QUIET * speed / (2.0 * np.pi * noise * np.sqrt(2.0 / 3.0 * record.sample_time))) ** (2.0 / 3.0))
+
+
+def _thin(edge: int, decimation: int, stretch: Stretch, values: Array) -> Array:
+    """Rows of a full-rate signal of ``stretch``, ``(n,)`` or ``(n, columns)``: means over windows two row times wide."""
+    n = values.shape[0]
+    if decimation == 1:
+        return values[edge : n - edge]
+    window = signal.windows.parzen(2 * decimation + 1)
+    window /= np.sum(window)
+    rows = np.lib.stride_tricks.sliding_window_view(values, 2 * decimation + 1, axis=0)[edge - decimation :: decimation]
+    wanted = len(range(edge, n - edge, decimation))
+    return np.asarray(rows[:wanted] @ window, dtype=np.float64)
+
+
+def _near(mask: Mask, reach: int) -> Mask:
+    """True for each sample within ``reach`` samples of one that is True in ``mask``."""
+    return np.asarray(maximum_filter1d(mask.astype(np.uint8), 2 * reach + 1) > 0, dtype=np.bool_)
+
+
+def _can_stand_for(clear: Mask, sliding: Mask, velocity: Array) -> bool:
+    """Whether enough rows are ``clear`` in each direction in which the joint slides."""
+    return all(
+        np.sum(clear & way) >= max(_MIN_ROWS, _FEW * np.sum(sliding & way)) or np.sum(sliding & way) < _MIN_ROWS
+        for way in (velocity > 0.0, velocity < 0.0)
+    )
+
+
+def _unclear(stretches: Sequence[Stretch], band: float) -> float:
+    """Velocity that noise alone may show in ``band`` [Hz]."""
+    return 4.0 * max(_velocity_noise(stretch, band) for stretch in stretches)
 
 
 def _velocity_noise(stretch: Stretch, band: float) -> float:
@@ -196,10 +331,13 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
     sos: Any = signal.butter(_FILTER_ORDER, 2.0 * cutoff * sample_time, output="sos")
     position = signal.sosfiltfilt(sos, raw)
     velocity = np.gradient(position, sample_time)
+    # Of fourth order: the central difference of a central difference would be lower by another few percent at the cutoff.
+    exact = velocity.copy()
+    exact[2:-2] = (8.0 * (position[3:-1] - position[1:-3]) - (position[4:] - position[:-4])) / (12.0 * sample_time)
     effort = record.effort[first:last]
     before = np.concatenate([effort[:1], effort[:-1]])
     after = np.concatenate([effort[1:], effort[-1:]])
-    neighbour = {"following": before, "preceding": after, "linear": effort}[record.effort_hold]
+    around = {"following": before + effort, "preceding": effort + after, "linear": effort + 0.5 * (before + after)}
     load, temperature = surroundings(record)
     return Stretch(
         time=record.time[first:last],
@@ -207,12 +345,13 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
         raw_position=raw,
         position=position,
         velocity=velocity,
-        acceleration=np.gradient(velocity, sample_time),
+        acceleration=np.gradient(exact, sample_time),
         effort=effort,
-        force=0.5 * (effort + neighbour),
+        force=0.5 * around[record.effort_hold],
         hold=record.effort_hold,
         load=load[first:last] if load.shape[0] > 1 else load,
         temperature=temperature[first:last] if temperature.shape[0] > 1 else temperature,
+        smooth=partial(signal.sosfiltfilt, sos),
     )
 
 

@@ -55,6 +55,7 @@ def minimise(
     point_tolerance: float = 1e-6,
     cost_tolerance: float = 1e-8,
     max_iterations: int = 60,
+    most_slow: int = 0,
 ) -> Solution:
     """The point within bounds at which the sum of squares of ``function`` is smallest, near ``start``.
 
@@ -66,12 +67,14 @@ def minimise(
         difference: step of the forward differences, relative.
         point_tolerance: relative step at which to stop.
         cost_tolerance: relative decrease, predicted by the linear model, at which to stop.
+        most_slow: number of steps in a row that decrease the cost by less than that, at which to stop; 0: no such limit.
         max_iterations: limit.
     """
     point = np.clip(start, lower, upper)
     residual = function(point)
     cost = float(residual @ residual)
     damping, growth = _FIRST_DAMPING, 2.0
+    slow = 0  # steps in a row that gained nearly nothing, as where differences can't see the minimum any better
     jacobian = np.empty((residual.shape[0], point.shape[0]))
     for iteration in range(1, max_iterations + 1):
         _differences(function, point, residual, upper, difference, jacobian)
@@ -81,7 +84,7 @@ def minimise(
             # Decrease of the sum of squares that the linear model promises.
             promised = -float(step @ (2.0 * gradient + normal @ step))
             small = np.all(np.abs(step) <= point_tolerance * (np.abs(point) + point_tolerance))
-            if small or 0.0 <= promised <= cost_tolerance * cost:
+            if small or 0 < most_slow <= slow or 0.0 <= promised <= cost_tolerance * cost:
                 return Solution(point, residual, jacobian, True, iteration)
             if promised < 0.0:
                 # A bound has bent the step uphill; a shorter one goes along the gradient.
@@ -92,6 +95,7 @@ def minimise(
             trial_cost = float(trial_residual @ trial_residual)
             gain = (cost - trial_cost) / promised
             if gain > 0.0:
+                slow = slow + 1 if cost - trial_cost <= cost_tolerance * cost else 0
                 point, residual, cost = trial, trial_residual, trial_cost
                 damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 1e-12)
                 growth = 2.0

@@ -14,19 +14,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import comb
 
 from ..model import Model
 from ..record import Array, Record
 from ..simulate import intervals
 from .equations import surroundings
+from .statistics import noise_of
 
-__all__ = ["SETTLING", "Run", "excerpt", "innovations", "noise_of", "runs_of"]
+__all__ = ["SETTLING", "Run", "excerpt", "gains", "innovations", "noise_of", "runs_of"]
 
 SETTLING = 20
 """Innovations dropped at the start of each run."""
-
-_DIFFERENCES = 6  # of a signal, which leave its white noise and hardly any of its motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +114,7 @@ def innovations(model: Model, runs: Sequence[Run], index: float, n_substeps: int
     """
     loops, values = model.loops, model.values
     plant_values = np.array(model.plant_values)
-    alpha, beta = _gains(index)
+    alpha, beta = gains(index)
     parts = []
     for run in runs:
         state = np.ascontiguousarray(model.plant.start(plant_values, *run.start), dtype=np.float64)
@@ -130,14 +128,8 @@ def innovations(model: Model, runs: Sequence[Run], index: float, n_substeps: int
     return np.asarray(np.nan_to_num(np.concatenate(parts), nan=1e3, posinf=1e3, neginf=-1e3), dtype=np.float64)
 
 
-def _gains(index: float) -> tuple[float, float]:
+def gains(index: float) -> tuple[float, float]:
     """Alpha and beta for a tracking index."""
     r = (4.0 + index - math.sqrt(8.0 * index + index * index)) / 4.0
     alpha = 1.0 - r * r
     return alpha, 2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha)
-
-
-def noise_of(signal: Array) -> float:
-    """Standard deviation of the white noise of a signal, from high differences, which no smooth motion survives."""
-    gain = math.sqrt(float(comb(2 * _DIFFERENCES, _DIFFERENCES)))
-    return float(np.median(np.abs(np.diff(signal, _DIFFERENCES)))) / (0.6745 * gain)

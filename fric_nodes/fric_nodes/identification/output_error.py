@@ -1,93 +1,57 @@
 """Output error: the parameters whose simulated motion, led by the measured force alone, comes closest to the measured one.
 
-Minimises sum (q - q_hat)^2 over free runs of the compiled simulation, from the values that inverse dynamics finds, by
-trust-region least squares. With the whole recording as one run this is the published test of an axis model; on an axis
-whose position drifts away under small force errors, shorter runs (``horizon``) start again from the measured state, their
-friction state led along the measured motion, so that no error builds up through the integrator.
-Source: Ljung 1999, chapter 7 (output error); the runs' start states are those of the filtered recording.
+Minimises sum (q - q_hat)^2 over free runs of the compiled simulation, from the values that inverse dynamics finds, by damped
+Gauss-Newton steps. With the whole recording as one run this is the published test of an axis model. On an axis whose position
+drifts away under small force errors, or that runs away without its controller, shorter runs (``horizon``) keep errors from
+building up through the integrator; where they start is found with the parameters
+(:mod:`fric_nodes.identification.multiple_shooting`). Several starts (``starts``) search for a better minimum than the nearest.
+Source: Ljung 1999, chapter 7 (output error).
 
 Standard errors: in a free run an error of the force adds up for as long as friction lets it, so that the residuals of a whole
 recording are few independent numbers, however many samples they have; no window over their correlation sees that. The errors
-of the force themselves are short. They are taken from the equations of inverse dynamics at the values found (away from
-reversals, where those are wrong by their filter), put together anew from blocks, and led through the same runs; with J the
-Jacobian, J' times what they change in the position is a draw of the score, and the covariance is (J'J)^-1 S (J'J)^-1 with S the
-mean square of the draws. The noise of the position, drawn with them, adds its part.
+of the force themselves are short. They are measured (:mod:`fric_nodes.identification.force_errors`), put together anew from
+blocks, and led through the same runs; with J the Jacobian, J' times what they change in the position is a draw of the score,
+and the covariance is (J'J)^-1 S (J'J)^-1 with S the mean square of the draws. The noise of the position,
+and the error of the runs' start states, drawn with them, add their part. J is made of secants as wide as the uncertainty.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
 
+from ..errors import InputError
 from ..model import Model
-from ..record import Array, Index, Record
-from ..simulate import Predictor, Simulator, intervals, substeps
+from ..record import Array, Record
 from . import inverse_dynamics
-from .bootstrap import block_length, drawn_series
 from .conclusion import Fitted, concluded, standard_errors
-from .equations import Equations, Stretch
+from .equations import Equations
+from .force_errors import force_errors
 from .free_parameters import FreeParameters
-from .gauss_newton import minimise
-from .innovations import noise_of
+from .gauss_newton import Solution, minimise
+from .multi_start import best_of, spread_starts
+from .multiple_shooting import Shooting, shooting
 from .problem import Problem
 from .result import Identification, Method, Options
-from .scoring import driving_force
 
 __all__ = ["METHOD", "fit", "problem"]
 
+_DIFFERENCE = 1e-3  # relative step of derivatives: wide enough to reach over the kinks of sticking
+_COST_TOLERANCE = 1e-6  # a hundredth of a standard error, since the errors are no more than hundreds of independent ones
+_MOST_SLOW = 3  # steps: where differences can't see the minimum any better
+_WIDEST = 0.2  # relative, of secants over the uncertainty
 _DRAWS = 60  # of force errors: their spread is known to a tenth
-_AWAY = 5  # rows on either side of a reversal or a rest, in which the filters mix two directions of friction
+_BRIEF = 8  # iterations, after which a start that is far behind is given up
+_ROUNDS = 6  # at most, of parameters with the starts' influence held, and starts
+_SETTLED = 0.02  # standard errors: a change of the parameters that needs no further round
+_LOST = 0.5  # of the recorded motion's standard deviation: an error that says that the model goes elsewhere
+START_STATES = ("measured", "tied", "free")
 
 
-@dataclass(frozen=True)
-class _Run:
-    """Samples ``first`` to ``last`` (exclusive) of a stretch, simulated on their own."""
-
-    stretch: Stretch
-    first: int
-    last: int
-
-
-def _runs(stretches: Sequence[Stretch], horizon: float | None) -> list[_Run]:
-    runs = []
-    for stretch in stretches:
-        n = stretch.time.shape[0]
-        length = n if horizon is None else max(round(horizon / stretch.sample_time), 10)
-        runs += [_Run(stretch, first, min(first + length + 1, n)) for first in range(0, n - 1, length)]
-    return [run for run in runs if run.last - run.first > 2]
-
-
-def _part(signal: Array, run: _Run) -> Array:
-    """The run's part of a signal with one value per interval, or the one value that it has."""
-    return signal[run.first : run.last - 1] if signal.shape[0] > 1 else signal
-
-
-def _errors(model: Model, runs: Sequence[_Run], n_substeps: int, push: Mapping[int, Array] | None = None) -> Array:
-    """Simulated minus measured position over all runs [x]; ``push`` is added to the force of each interval, by run."""
-    errors = []
-    leader: tuple[Stretch, Predictor] | None = None
-    for number, run in enumerate(runs):
-        s, part = run.stretch, slice(run.first, run.last)
-        simulator = Simulator(model, float(s.position[run.first]), float(s.velocity[run.first]))
-        if model.has_slip_dynamics:
-            if leader is None or leader[0] is not s:
-                leader = (s, Predictor(model))
-            simulator.friction_state[:] = leader[1].friction_state
-            q, v, a = (_part(signal, run) for signal in (s.position, s.velocity, s.acceleration))
-            load, temperature = _part(s.load, run), _part(s.temperature, run)
-            leader[1].run(_part(s.time, run), q, v, a, s.sample_time, load, temperature)
-        effort = intervals(s.effort[part], s.hold)
-        if push is not None:
-            effort = effort + push[number]
-        states, _ = simulator.run(effort, s.sample_time, n_substeps, _part(s.load, run), _part(s.temperature, run))
-        errors.append(states[:, 0] - s.raw_position[part][1:])
-    return np.concatenate(errors)
-
-
-def _search(model: Model, free: FreeParameters, runs: Sequence[_Run], n_substeps: int) -> Problem:
+def _search(model: Model, free: FreeParameters, residual_of: Callable[[Model], Array], runs: Shooting) -> Problem:
     """The position errors as a function of the free parameters, each relative to its value in ``model``."""
     values = model.values
     scale = np.abs(values[free.index])
@@ -96,63 +60,120 @@ def _search(model: Model, free: FreeParameters, runs: Sequence[_Run], n_substeps
     def residual(scaled: Array) -> Array:
         trial = values.copy()
         trial[free.index] = scaled * scale
-        errors = _errors(model.with_values(trial), runs, n_substeps)
-        # A run that escapes must cost much, not break the solver.
-        return np.nan_to_num(errors, nan=1e6, posinf=1e6, neginf=-1e6)
+        return residual_of(model.with_values(trial))
 
-    starts = np.cumsum([0, *(run.last - run.first - 1 for run in runs)])[:-1]
-    return Problem(free.names, residual, values[free.index] / scale, free.lower / scale, free.upper / scale, scale, starts)
+    lower, upper = free.lower / scale, free.upper / scale
+    point = np.clip(values[free.index] / scale, lower, upper)
+    return Problem(free.names, residual, point, lower, upper, scale, runs.first_errors[:-1])
 
 
-def problem(model: Model, free: FreeParameters, found: Equations, horizon: float | None) -> tuple[Problem, Iterator[Array]]:
+def problem(
+    model: Model, free: FreeParameters, found: Equations, horizon: float | None, options: Options | None = None
+) -> tuple[Problem, Iterator[Array]]:
     """The sum of squares that ``model`` is the minimum of, and draws of what errors of the force change in its residuals."""
-    runs = _runs(found.stretches, horizon)
-    n_substeps = max(substeps(model, stretch.sample_time) for stretch in found.stretches)
-    return _search(model, free, runs, n_substeps), _draws(model, found, runs, n_substeps)
+    options = Options(horizon=horizon) if options is None else options
+    runs, draws = _prepared(model, free, found, options)
+    return _search(model, free, runs.reduced(model), runs), draws
 
 
-def _force_errors(model: Model, found: Equations) -> tuple[Array, Index]:
-    """What the equations of inverse dynamics miss [F] away from reversals and rest, and the rows without their neighbour."""
-    error = driving_force(model, found) - inverse_dynamics.predicted(model, found)
-    steady = np.sign(found.velocity) * found.sliding
-    good = steady != 0.0
-    for shift in range(1, _AWAY + 1):
-        good[shift:] &= steady[shift:] == steady[:-shift]
-        good[:-shift] &= steady[shift:] == steady[:-shift]
-    # Where next to nothing is away from reversals, what is left is better than nothing.
-    row = np.flatnonzero(good if np.sum(good) >= 20 else found.sliding)
-    return error[row], np.flatnonzero(np.isin(row, found.starts) | (np.diff(row, prepend=row[0]) > 1))
+def _prepared(model: Model, free: FreeParameters, found: Equations, options: Options) -> tuple[Shooting, Iterator[Array]]:
+    """The runs with the starts that suit ``model``, and draws for their residuals."""
+    runs = _runs(model, found, options)
+    disturbance = force_errors(model, free, found)
+    runs = runs.weighed(model, disturbance).settled(model)
+    eliminate = runs.elimination(model)
+    drawn = runs.draws(model, disturbance)
+    return runs, drawn if eliminate is None else (eliminate(moved) for moved in drawn)
 
 
-def _draws(model: Model, found: Equations, runs: Sequence[_Run], n_substeps: int) -> Iterator[Array]:
-    """What force errors and position noise like those of the recording change in the position errors [x], without end."""
-    error, starts = _force_errors(model, found)
-    length = block_length(error[:, None])
-    row_time = float(np.median(np.diff(found.time)))
-    random = np.random.default_rng(1)
-    undisturbed = _errors(model, runs, n_substeps)
-    noises = [noise_of(run.stretch.raw_position) for run in runs]
-    while True:
-        push = {}
-        noise = []
-        for number, run in enumerate(runs):
-            n = run.last - run.first - 1
-            time = run.stretch.sample_time * np.arange(n)
-            rows = drawn_series(error, int(time[-1] / row_time) + 2, length, starts, random)
-            push[number] = np.interp(time, row_time * np.arange(rows.shape[0]), rows)
-            noise.append(noises[number] * random.standard_normal(n))
-        moved = np.nan_to_num(_errors(model, runs, n_substeps, push), nan=1e6, posinf=1e6, neginf=-1e6)
-        yield moved - undisturbed + np.concatenate(noise)
+def _runs(model: Model, found: Equations, options: Options) -> Shooting:
+    starts = options.start_states or ("measured" if options.horizon is None else "free")
+    if starts not in START_STATES:
+        raise InputError("start_states", f"'{starts}' is not known", f"use one of {', '.join(START_STATES)}")
+    return shooting(model, found, options.horizon, starts, options.continuity)
 
 
-def _covariance(model: Model, jacobian: Array, found: Equations, runs: Sequence[_Run], n_substeps: int) -> Array:
-    """Of the estimate, shape ``(n_free, n_free)``; see the module."""
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """One search from one start.
+
+    Attributes:
+        model: with the values found.
+        answer: how the last round ended.
+        scale: of its point.
+        runs: with the starts found.
+    """
+
+    model: Model
+    answer: Solution
+    scale: Array
+    runs: Shooting
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares at the end."""
+        return float(self.answer.residual @ self.answer.residual)
+
+
+def _minimised(model: Model, free: FreeParameters, runs: Shooting, max_iterations: int = 60, rounds: int = _ROUNDS) -> _Found:
+    """Parameters and starts together, from ``model`` on."""
+    for _ in range(rounds):
+        runs = runs.settled(model)
+        search = _search(model, free, runs.reduced(model), runs)
+        answer = minimise(
+            search.residual,
+            search.point,
+            search.lower,
+            search.upper,
+            difference=_DIFFERENCE,
+            cost_tolerance=_COST_TOLERANCE,
+            most_slow=_MOST_SLOW,
+            max_iterations=max_iterations,
+        )
+        values = model.values
+        values[free.index] = answer.point * search.scale
+        model = model.with_values(values)
+        finer = runs.refined(model)
+        if finer.n_substeps == runs.n_substeps and (not runs.tied or _small(answer.point - search.point, answer)):
+            break
+        runs = finer
+    return _Found(model, answer, search.scale, runs)
+
+
+def _small(change: Array, answer: Solution) -> bool:
+    """True when a change moves the errors by far less than they are uncertain, were they white."""
+    moved = answer.jacobian @ change
+    limit = _SETTLED**2 * float(answer.residual @ answer.residual) / answer.residual.shape[0]
+    return bool(float(moved @ moved) <= limit)
+
+
+def _covariance(
+    found: _Found, free: FreeParameters, equations: Equations, options: Options, errors: Mapping[str, float]
+) -> Array:
+    """Of the estimate, shape ``(n_free, n_free)``; see the module. ``errors``: what the start's standard errors were."""
+    runs, draws = _prepared(found.model, free, equations, options)
+    search = _search(found.model, free, runs.reduced(found.model), runs)
+    jacobian = _secants(search, np.array([errors[name] for name in free.names])) / search.scale
     scale = np.linalg.norm(jacobian, axis=0)
     scale[scale == 0.0] = 1.0
     scaled = jacobian / scale
     bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-12, hermitian=True)
-    scores = np.array([scaled.T @ moved for moved in islice(_draws(model, found, runs, n_substeps), _DRAWS)])
+    scores = np.array([scaled.T @ moved for moved in islice(draws, _DRAWS)])
     return np.asarray(bread @ (scores.T @ scores / _DRAWS) @ bread / np.outer(scale, scale), dtype=np.float64)
+
+
+def _secants(search: Problem, errors: Array) -> Array:
+    """Change of the residuals with each parameter over about its uncertainty, shape ``(n, n_free)``.
+
+    Where a joint sticks and slips, a tangent can be many times steeper than the misfit is over that distance, and would promise
+    as much more certainty.
+    """
+    columns = []
+    for k, step in enumerate(np.clip(errors / search.scale, _DIFFERENCE, _WIDEST)):
+        ahead, behind = search.point.copy(), search.point.copy()
+        ahead[k], behind[k] = min(ahead[k] + step, search.upper[k]), max(behind[k] - step, search.lower[k])
+        columns.append((search.residual(ahead) - search.residual(behind)) / (ahead[k] - behind[k]))
+    return np.array(columns).T
 
 
 def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
@@ -160,32 +181,53 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
 
     Raises:
         IdentificationError: the recordings can't determine it.
+        InputError: an option isn't known.
     """
     begun = inverse_dynamics.fit_force(structure, records, options)
     start, free, found = begun.model, begun.free, begun.found
     known = standard_errors(free, begun.covariance)
     free = free.without({name for name in free.names if name not in known})
-    runs = _runs(found.stretches, options.horizon)
-    # The same for every trial: a change from one number of sub-steps to the next would look like a slope.
-    n_substeps = max(substeps(start, stretch.sample_time) for stretch in found.stretches)
-    search = _search(start, free, runs, n_substeps)
-    answer = minimise(search.residual, search.point, search.lower, search.upper)
-    values = start.values
-    values[free.index] = answer.point * search.scale
-    fitted_model = start.with_values(values)
-    covariance = _covariance(fitted_model, answer.jacobian / search.scale, found, runs, n_substeps)
-    trouble = ""
-    if not answer.converged:
+    runs = _runs(start, found, options)
+    if runs.tied:
+        runs = runs.weighed(start, force_errors(start, free, found))
+    starts = [start, *spread_starts(start, free, found, options.starts - 1)]
+
+    def briefly(model: Model) -> _Found:
+        return _minimised(model, free, runs, _BRIEF, 1)
+
+    def to_the_end(model: Model) -> _Found:
+        return _minimised(model, free, runs.refined(model))
+
+    best, ends = best_of(briefly, to_the_end, starts, free)
+    trouble = _escape(best, options)
+    if not trouble and not best.answer.converged:
         remedy = "start nearer to the machine's values (--model), or shorten the runs (--horizon)"
-        trouble = f"not converged after {answer.iterations} steps; {remedy}"
-    fitted = Fitted(fitted_model, free, covariance, found, begun.messages)
-    return concluded(METHOD.id, fitted, records, options, trouble)
+        trouble = f"not converged after {best.answer.iterations} steps; {remedy}"
+    covariance = _covariance(best, free, found, options, known)
+    fitted = Fitted(best.model, free, covariance, found, begun.messages)
+    result = concluded(METHOD.id, fitted, records, options, trouble)
+    if options.starts <= 1:
+        return result
+    errors = np.sqrt(np.diag(covariance))
+    doubt = ends.warning(errors)
+    return replace(result, notes=(*result.notes, ends.note(errors)), warnings=(*result.warnings, *([doubt] if doubt else [])))
+
+
+def _escape(best: _Found, options: Options) -> str:
+    """What to say when the motion found has little to do with the recorded one; empty when it has."""
+    errors, _ = best.runs.errors(best.model)
+    measured = np.concatenate([run.stretch.position for run in best.runs.runs])
+    if float(np.std(errors)) < _LOST * float(np.std(measured)):
+        return ""
+    horizon = "whole recordings" if options.horizon is None else f"{options.horizon:g} s"
+    return f"the free run does not follow the recording over {horizon}: not to be relied on; shorten the runs (--horizon)"
 
 
 METHOD = Method(
     id="output-error",
     title="output error of a free run",
     needs="as inverse dynamics; a structure that is nearly complete, since a free run adds up every error",
-    source="Ljung 1999, chapter 7",
+    source="Ljung 1999, chapter 7; multiple shooting: Bock 1983",
     fit=fit,
+    predicts="position",
 )
