@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .diagnose import DiagnosisError, diagnose
+from .diagnose import DiagnosisError, diagnose, refit_noe
 from .result import Diagnosis
 
-__all__ = ["Diagnosis", "DiagnosisError", "diagnose"]
+__all__ = ["Diagnosis", "DiagnosisError", "diagnose", "refit_noe"]

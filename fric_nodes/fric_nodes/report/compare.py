@@ -1,0 +1,87 @@
+"""The page of ``fric compare``: both recordings over each other, their difference, and where it sits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..diagnosis.compare import Comparison
+from .figures import COLOURS, Curve, stacked
+from .numbers import significant
+from .page import Section, bullets, figure, paragraph, render, table, tiles
+
+__all__ = ["comparison_report"]
+
+_MOST_SPANS = 120  # drawn; a page with thousands of them is slow
+
+
+def comparison_report(found: Comparison) -> str:
+    """The page as text."""
+    held = {each.signal: each for each in found.agreements}
+    entries = [(f"{each.noe:.3g} %", f"normalised output error of the {name}") for name, each in held.items()]
+    entries.append((f"{1e3 * found.offset:.4g} ms", f"offset, +- {1.96e3 * found.offset_error:.2g} ms (95 %)"))
+    sections = [
+        Section("", (paragraph(found.sentence, "verdict"), tiles(entries))),
+        _signals(found),
+        _figures(found),
+        _alignment(found),
+    ]
+    if found.notes:
+        sections.append(Section("What to know", (bullets(found.notes),)))
+    lead = f"Simulated: {found.simulated}. Real: {found.real}. Times are those of the real recording."
+    return render(f"Simulated and real: '{found.joint}'", lead, sections)
+
+
+def _signals(found: Comparison) -> Section:
+    head = ("signal", "RMSE", "mean difference", "largest", "unit", "NOE [%]", "correlation")
+    rows = [
+        (
+            each.signal,
+            significant(each.rmse),
+            significant(each.bias),
+            significant(each.largest),
+            each.unit,
+            significant(each.noe),
+            f"{each.correlation:.5f}",
+        )
+        for each in found.agreements
+    ]
+    note = "Difference: simulated minus real. NOE: energy of the difference over that of the real signal about its mean."
+    return Section("How well they agree", (table(head, rows, text_columns=(0, 4)), paragraph(note, "note")))
+
+
+def _figures(found: Comparison) -> Section:
+    panels = []
+    for each in found.agreements:
+        real, simulated = found.signals[each.signal]
+        over = [Curve("real", found.time, real, "measured", width=2.4), Curve("simulated", found.time, simulated, "after")]
+        panels.append((f"{each.signal} [{each.unit}]", over))
+    by = found.located_by
+    real, simulated = found.signals[by]
+    unit = next(each.unit for each in found.agreements if each.signal == by)
+    panels.append((f"difference of {by} [{unit}]", [Curve("simulated minus real", found.time, simulated - real, "before")]))
+    plot = stacked(panels, "time [s]", height=190)
+    spans = found.where.time[0] if found.where is not None and found.where.time else ()
+    for first, last in sorted(spans, key=lambda span: span[0] - span[1])[:_MOST_SPANS]:
+        plot.add_vrect(x0=first, x1=last, fillcolor=COLOURS["before"], opacity=0.13, line_width=0, layer="below")
+    caption = "Drag to zoom, double click to go back."
+    if found.where is not None:
+        caption += f" Shaded: where {100 * found.where.share:.0f} % of the energy of the difference sits."
+    blocks = [figure(plot, caption)]
+    if found.where is not None:
+        blocks.insert(0, paragraph(f"The difference of {by} sits here: {found.where.regime}."))
+    return Section("Where they differ", tuple(blocks))
+
+
+def _alignment(found: Comparison) -> Section:
+    low, high = found.interval
+    rows = [
+        ("offset of the clocks [s]", f"{found.offset:.6f}", f"{low:.6f} to {high:.6f}"),
+        (
+            "ratio of the clocks",
+            f"{found.ratio:.8f}",
+            f"{found.ratio - 1.96 * found.ratio_error:.8f} to {found.ratio + 1.96 * found.ratio_error:.8f}",
+        ),
+        ("time in common [s]", significant(float(np.ptp(found.time))), ""),
+    ]
+    note = "A time of the real recording is the offset plus the ratio times the simulated one's."
+    return Section("Alignment in time", (table(("", "value", "95 % interval"), rows), paragraph(note, "note")))
