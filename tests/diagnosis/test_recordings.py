@@ -2,36 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio.importing import import_recording
 from fric_nodes.diagnosis import Diagnosis, diagnose
 from fric_nodes.model import Model, build_model, term
 from fric_nodes.record import Record, Units
 from scipy.io import loadmat
 
 pytestmark = pytest.mark.real_data
-
-CYLINDER = {
-    "joint": "cylinder",
-    "header": False,
-    "skip_rows": 15,
-    "time": {"from": 0, "unit": "ms"},
-    "position": {"from": 4, "unit": "mm"},
-    "effort": {"from": 6, "unit": "N"},
-    "extra": {"pressure": {"from": 5, "unit": "Pa", "scale": 1e5}},
-}
-SCREW = {
-    "joint": "screw",
-    "time": {"from": 0, "unit": "ms"},
-    "velocity": {"from": "Velocity actual value averaged", "unit": "rpm", "scale": -1},
-    "effort": {"from": "Torque actual value averaged", "unit": "mNm", "scale": -0.0984},
-}
 
 
 def symmetric(mass: float, level: float, viscous: float, bias: float, units: Units | None = None) -> Model:
@@ -74,32 +55,3 @@ def test_the_axis_has_direction_dependent_friction_that_survives_on_blocks_held_
     # As inverse dynamics finds it, too: less viscous friction forward than backward.
     assert -50.0 < found.parameters["asymmetry.coefficient"].value < -25.0
     assert error(emps, "augmented") < 0.75 * error(emps, "refit")
-
-
-@pytest.mark.parametrize("seal", ["O", "X"])
-def test_seals_press_harder_with_pressure(data_folder: Path, seal: str) -> None:
-    """The pressure is recorded as the load; its thrust is taken off the force."""
-    area = math.pi / 4.0 * 0.0257**2
-    train, held = [], []
-    for bar in (1, 3, 5, 7):
-        path = data_folder / "pneumatic_friction" / f"{seal}-ring257_{bar}bar.csv"
-        record = import_recording(path, CYLINDER, repair=True)
-        thrust = record.extra["pressure"] * area
-        record = replace(record, effort=record.effort - thrust, extra={"normal_load": thrust})
-        half = record.n_samples // 2
-        train.append(record.slice(0, half))
-        held.append(record.slice(half, record.n_samples))
-    found = diagnose(train, held, symmetric(0.5, 6.0, 20.0, 3.0, train[0].units))
-    assert "load_dependence" in named(found)
-    assert found.validation.noe_augmented < found.validation.noe_refit
-
-
-def test_the_anti_backlash_screw_has_no_stribeck_effect(data_folder: Path) -> None:
-    train, held = [], []
-    for path in sorted((data_folder / "screw_drives" / "driveNo2" / "steady_state" / "0.096kg").glob("*.csv")):
-        record = import_recording(path, SCREW)
-        half = record.n_samples // 2
-        train.append(record.slice(0, half))
-        held.append(record.slice(half, record.n_samples))
-    found = diagnose(train, held, symmetric(1e-6, 0.005, 2e-5, 0.0, train[0].units))
-    assert "stribeck" not in named(found)

@@ -19,6 +19,7 @@ import numpy as np
 from ..effect import Effect, Place
 from ..model import Model, Term
 from ..parameter import Parameter
+from ..plants import PLANTS
 from ..record import Array
 from .track import Track
 from .twin import smooth
@@ -114,18 +115,39 @@ class Candidate:
 def candidates(model: Model, scales: Scales) -> list[Candidate]:
     """Every effect that ``model`` could get, with terms to try."""
     present = {held.effect.id for held in model.terms}
+    play = any(held.effect.play is not None for held in model.terms)
+    has_level = any(held.effect.level is not None for held in model.terms)
     found = []
     for effect in worth_trying():
         if effect.id in present and not effect.repeatable:
             continue
         if effect.slip is not None and model.has_slip_dynamics:
             continue
-        if (effect.link is not None or effect.play is not None) and model.plant.driven is None:
+        if (effect.link is not None or effect.play is not None) and PLANTS[model.plant.id].driven is None:
             continue
+        if play and (effect.link is None) != (effect.play is None):
+            continue  # a spring beyond a play is the same as elastic stops, and one play is enough
+        if effect.level is not None and effect.remember is not None and not has_level:
+            continue  # what friction gains at rest, or follows late, is relative to a level
         trials = tuple(Term(effect, values) for values in _values(effect, scales))
+        if play and effect.link is not None:
+            trials = tuple(_stops(trials[0], scales))
         if trials:
             found.append(Candidate(effect, trials))
     return found
+
+
+def _stops(held: Term, scales: Scales) -> Iterator[Term]:
+    """Elastic stops at the ends of a play that the model has already: hardly any more play, from soft to hard."""
+    names = [parameter.name for parameter in held.effect.parameters]
+    for rate in 2.0 * math.pi * np.geomspace(8.0, 2.0 * scales.fastest, 8):
+        values = list(held.values)
+        for name, parameter in zip(names, held.effect.parameters, strict=True):
+            if parameter.dimension == "x":
+                values[names.index(name)] = max(3.0 * scales.grain, 1e-5 * scales.travel)
+            if parameter.dimension == "F/x":
+                values[names.index(name)] = 0.25 * scales.mass * float(rate) ** 2
+        yield Term(held.effect, tuple(_with_damping(held.effect, values, scales)))
 
 
 def _values(effect: Effect, scales: Scales) -> Iterator[tuple[float, ...]]:

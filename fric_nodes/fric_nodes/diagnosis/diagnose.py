@@ -26,6 +26,7 @@ from ..model import Model
 from ..record import Array, Record
 from .candidates import Scales, candidates, place_of, scales_of
 from .confidence import confidence_of, unknown_confidence
+from .excerpt import confirmed, excerpt
 from .grow import Growth, Step, best_track, grow
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
@@ -70,7 +71,13 @@ def diagnose(
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
     start = _started(nominal, train)
-    growth = grow(_tracks(train, start), start, tell)
+    tracks = _tracks(train, start)
+    parts = excerpt(tracks, start)
+    growth = grow(tracks if parts is None else parts.tracks, start, tell)
+    if parts is not None:
+        tell("fitting what was found to all samples")
+        growth, note = confirmed(parts, growth)
+        corrected.append(note)
     tell("judging on the validation recordings")
     return _concluded(train, validation, nominal, checks, corrected, growth)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..effect import Effect
 from ..model import Model, ModelError, Term
+from ..plants import PLANTS
 from ..record import Array
 from .candidates import Scales, candidates, scales_of
 from .screen import Gram, Screening, Tried, blocks_of, screen
@@ -129,13 +130,14 @@ class Growth:
     rejected: tuple[tuple[str, str], ...] = field(default=())
 
 
+def is_driven(model: Model) -> bool:
+    """True when the model has two bodies because it has a transmission."""
+    return model.plant is PLANTS[model.plant.id].driven
+
+
 def free_names(model: Model) -> tuple[str, ...]:
     """The parameters that a fit moves: all but shapes, and the share of the mass behind a transmission."""
-    return tuple(
-        p.name
-        for p in model.parameters()
-        if not p.declaration.shape or (p.name == "load_share" and model.plant.driven is model.plant)
-    )
+    return tuple(p.name for p in model.parameters() if not p.declaration.shape or (p.name == "load_share" and is_driven(model)))
 
 
 def refit(track: Track, model: Model, bounds: Bounds | None = None, max_iterations: int = 12) -> State:
@@ -205,7 +207,7 @@ def _bounds(model: Model, scales: Scales) -> Bounds:
         if "." in p.name and not p.declaration.linear and p.declaration.dimension in ranges:
             low, high = ranges[p.declaration.dimension]
             found[p.name] = (min(low, p.value), max(high, p.value))
-    if model.plant is model.plant.driven:
+    if is_driven(model):
         found["load_share"] = (0.05, 0.95)
     return found
 

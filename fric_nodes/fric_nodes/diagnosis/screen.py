@@ -25,7 +25,7 @@ from .track import Fit, Track
 from .twin import smooth
 from .universe import universe_of
 
-__all__ = ["Column", "Gram", "Screening", "Tried", "columns_of", "narrowed", "screen"]
+__all__ = ["Column", "Gram", "Screening", "Tried", "blocks_of", "columns_of", "motions", "narrowed", "screen"]
 
 _BLOCKS = 10
 _KEPT = 2  # trials of a candidate that go from the quick columns to the observer's
@@ -111,18 +111,42 @@ def blocks_of(track: Track, n: int) -> Array:
     return np.unique(np.linspace(0, n, _BLOCKS + 1).astype(np.int64)[:-1])
 
 
-def narrowed(track: Track, fit: Fit, candidate: Candidate) -> list[Term]:
-    """The trials of ``candidate`` that promise most by the force they add along the measured motion."""
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The measured motion of one run, smoothed: position [x], velocity [x/s] and acceleration [x/s^2], and its step [s]."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    step: float
+
+
+def motions(track: Track) -> list[Motion]:
+    """The smoothed motion of each run, once for all candidates: filtering it costs more than to predict a force along it."""
+    found = []
+    for run in track.runs:
+        step = float(np.median(run.step))
+        position = smooth(run.position, step, 4.0 * track.bandwidth)
+        velocity = np.gradient(position, step)
+        found.append(Motion(position, velocity, np.gradient(velocity, step), step))
+    return found
+
+
+def narrowed(track: Track, fit: Fit, candidate: Candidate, motion: Sequence[Motion]) -> list[Term]:
+    """The trials of ``candidate`` that promise most by the force they add along the measured ``motion``."""
     effect = candidate.effect
     if len(candidate.trials) <= _KEPT or effect.neutral is None or effect.command is not None:
         return list(candidate.trials)
-    base = _along(track, fit.model, None)
+    base = _along(track, fit.model, None, motion)
     basis, _ = np.linalg.qr(fit.jacobian / np.maximum(np.linalg.norm(fit.jacobian, axis=0), 1e-300))
     missing = fit.residual - basis @ (basis.T @ fit.residual)
     promise = []
     for trial in candidate.trials:
         columns = np.array(
-            [track.seen([a - b for a, b in zip(_along(track, fit.model, part), base, strict=True)]) for part in _parts(trial)]
+            [
+                track.seen([a - b for a, b in zip(_along(track, fit.model, part, motion), base, strict=True)])
+                for part in _parts(trial)
+            ]
         ).T
         columns = columns - basis @ (basis.T @ columns)
         size = np.linalg.norm(columns, axis=0)
@@ -157,21 +181,17 @@ def _scales(name: str, trial: Term) -> bool:
     return parameter.linear or parameter.dimension not in ("F", "s")
 
 
-def _along(track: Track, model: Model, extra: Term | None) -> list[Array]:
+def _along(track: Track, model: Model, extra: Term | None, motion: Sequence[Motion]) -> list[Array]:
     """The force that ``model``, with ``extra``, needs along the measured motion [F], per run."""
     universe = universe_of(model)
     values = universe.values(model)
     if extra is not None:
         universe.put(values, extra)
     found = []
-    for run, time in zip(track.runs, track.time, strict=True):
-        step = float(np.median(run.step))
-        position = smooth(run.position, step, 4.0 * track.bandwidth)
-        velocity = np.gradient(position, step)
-        acceleration = np.gradient(velocity, step)
-        effort, friction = np.empty_like(position), np.empty_like(position)
+    for run, time, each in zip(track.runs, track.time, motion, strict=True):
+        effort, friction = np.empty_like(time), np.empty_like(time)
         universe.loops.predict(
-            values, time, position, velocity, acceleration, step, run.load, run.temperature,
+            values, time, each.position, each.velocity, each.acceleration, each.step, run.load, run.temperature,
             *universe.inner_states(model), effort, friction,
         )  # fmt: skip
         found.append(effort)
@@ -221,23 +241,30 @@ class Screening:
 
 def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: Sequence[Array]) -> Screening:
     """Every candidate at first order, alone and in pairs, on blocks that it has not seen."""
-    trials = [trial for candidate in found for trial in narrowed(track, fit, candidate)]
+    motion = motions(track)
+    trials = [trial for candidate in found for trial in narrowed(track, fit, candidate, motion)]
     columns = columns_of(track, fit, trials)
     n_free = len(fit.names)
     stacked = [fit.residual[:, None], *(each[:, None] for each in twin_residuals), fit.jacobian]
     first = 1 + len(twin_residuals) + n_free
     places = []
+    wholes: list[int] = []  # what is missing with the whole term there, where nothing makes the term weaker
     for column in columns:
         places.append(list(range(first, first + len(column.parts))))
         stacked += [part[:, None] for part in column.parts]
         first += len(column.parts)
+        wholes.append(first if column.term.effect.neutral is None else 0)
+        if column.term.effect.neutral is None:
+            stacked.append((fit.residual + column.parts[0])[:, None])
+            first += 1
     everything = np.concatenate(stacked, axis=1)
     gram = Gram(everything, blocks_of(track, everything.shape[0]))
     refit = list(range(1 + len(twin_residuals), 1 + len(twin_residuals) + n_free))
     alone = gram.left(0, refit)
     chance_alone = [gram.left(1 + k, refit) for k in range(len(twin_residuals))]
     able: list[tuple[Tried, list[int]]] = []
-    for column, place in zip(columns, places, strict=True):
+    promise: dict[int, float] = {}
+    for column, place, whole in zip(columns, places, wholes, strict=True):
         if not all(gram.total[k, k] > 1e-12 * gram.total[0, 0] for k in place):
             continue
         solved = gram.solved(0, refit + place)
@@ -246,10 +273,13 @@ def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: S
         left = gram.left(0, refit + place)
         by_chance = max((base - gram.left(1 + k, refit + place) for k, base in enumerate(chance_alone)), default=0.0)
         able.append((Tried(column, left, alone - left, by_chance, solved[n_free:], solved[:n_free]), place))
+        # A structure can't be there by a part: its values are judged by what it leaves as it is.
+        promise[id(column)] = gram.left(whole, refit) if whole else left
     best: dict[str, Tried] = {}
     for tried, _ in able:
-        name = tried.column.term.effect.id
-        if name not in best or tried.left < best[name].left:
+        effect = tried.column.term.effect
+        name = effect.id if effect.neutral is not None else effect.key
+        if name not in best or promise[id(tried.column)] < promise[id(best[name].column)]:
             best[name] = tried
     return Screening(alone, tuple(sorted(best.values(), key=lambda each: each.left)), _pairs(gram, refit, able))
 

@@ -18,7 +18,7 @@ from ..model import Model
 from ..record import Array, Record
 from .candidates import candidates, place_of, scales_of
 from .locate import locate, moved_back, steady
-from .screen import Gram, blocks_of, columns_of, narrowed
+from .screen import Gram, blocks_of, columns_of, motions, narrowed
 from .track import Fit, Track
 
 __all__ = ["Suspects", "prepare_suspects", "suspects"]
@@ -97,7 +97,8 @@ def suspects(model: Model, record: Record, bandwidth: float, floor: float) -> Su
     scales = scales_of(track)
     found = _present(track, model, missing)
     offered = [candidate for candidate in candidates(model, scales) if candidate.effect.id not in _SLOW_EFFECTS]
-    trials = [term for candidate in offered for term in narrowed(track, fit, candidate)]
+    motion = motions(track)
+    trials = [term for candidate in offered for term in narrowed(track, fit, candidate, motion)]
     for column in columns_of(track, fit, trials):
         effect = column.term.effect
         n_shapes = len(effect.parameters) - len(column.amplitudes)

@@ -169,7 +169,7 @@ class Track:
             effort = run.effort if efforts is None else efforts[k]
             position = run.position if positions is None else positions[k]
             alpha, beta = self.gains(run)
-            state = np.ascontiguousarray(universe.plant.start(plant_values, *run.start), dtype=np.float64)
+            state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k))
             found = np.empty(effort.shape[0])
             universe.loops.observe(
                 values, effort, position, run.step, self.n_substeps(model, run), run.load, run.temperature,
@@ -179,6 +179,10 @@ class Track:
             parts.append(scale * found)
         most = _LARGEST * max(float(np.ptp(run.effort)) for run in self.runs)
         return np.clip(np.nan_to_num(self.joined(parts), nan=most, posinf=most, neginf=-most), -most, most)
+
+    def begin(self, k: int) -> float:
+        """Time in its recording at which run ``k`` begins [s]: a part must not take a slow drift for a new one."""
+        return float(self.time[k][0] - self.runs[k].step[0])
 
     def n_substeps(self, model: Model, run: Run) -> int:
         """Steps of ``model`` per sample."""

@@ -44,16 +44,16 @@ def smooth(signal: Array, step: float, cutoff: float) -> Array:
     return result
 
 
-def _led(track: Track, model: Model, run: Run) -> tuple[Array, Array]:
+def _led(track: Track, model: Model, k: int) -> tuple[Array, Array]:
     """Position at the end of each interval, and command over it, of ``model`` led along the run's motion."""
-    universe = universe_of(model)
+    universe, run = universe_of(model), track.runs[k]
     step = float(np.median(run.step))
     position = np.concatenate([[run.start[0]], run.position])
     wanted = smooth(position, step, _SMOOTH * track.bandwidth)
     rate = np.gradient(wanted, step)
     lead = min(_LED * track.bandwidth, 0.15 / step)
     plant_values = np.array(model.plant_values)
-    state = np.ascontiguousarray(universe.plant.start(plant_values, float(wanted[0]), float(rate[0])), dtype=np.float64)
+    state = np.append(universe.plant.start(plant_values, float(wanted[0]), float(rate[0])), track.begin(k))
     there, given = np.empty(run.effort.shape[0]), np.empty(run.effort.shape[0])
     universe.loops.lead(
         universe.values(model), smooth(run.effort, step, _SMOOTH * track.bandwidth),
@@ -65,7 +65,7 @@ def _led(track: Track, model: Model, run: Run) -> tuple[Array, Array]:
 
 def twins(track: Track, model: Model, n_twins: int, seed: int = 1) -> list[Twin]:
     """``n_twins`` recordings that ``model`` would have left, each with noise of its own."""
-    led = [_led(track, model, run) for run in track.runs]
+    led = [_led(track, model, k) for k in range(len(track.runs))]
     random = np.random.default_rng(seed)
     return [_noisy(track.runs, led, random) for _ in range(n_twins)]
 

@@ -129,7 +129,8 @@ def observe(
     ``innovation[k]`` is ``y[k]`` minus its prediction [x], for ``len(u)`` intervals of lengths ``h`` [s]. The correction has
     the constant gains of an alpha-beta filter. A contact that sticks exactly is left at rest while the innovation stays within
     three times ``noise`` [x]: the noise of an encoder must not shake it loose. Where the sensor sees a motor, the load is
-    carried along, unless it sticks: what was learnt about both together must not push the one into the other.
+    carried along, unless it sticks: what was learnt about both together must not push the one into the other. A run that is
+    part of a recording gives, after its ``states``, the time at which it begins [s].
     """
     prepare(p, constants)
     p = unpacked(p)
@@ -137,7 +138,7 @@ def observe(
     for j in range(N_STATES):
         x[j] = states[j]
     s = Inner(z, z_next, memory, constants)
-    t = 0.0
+    t = states[N_STATES] if states.shape[0] > N_STATES else 0.0
     for k in range(u.shape[0]):
         h_sub = h[k] / n_sub
         load_k = load[k] if load.shape[0] > 1 else load[0]
@@ -174,7 +175,7 @@ def lead(
     for j in range(N_STATES):
         x[j] = states[j]
     s = Inner(z, z_next, memory, constants)
-    t = 0.0
+    t = states[N_STATES] if states.shape[0] > N_STATES else 0.0
     for k in range(u.shape[0]):
         h_sub = h[k] / n_sub
         load_k = load[k] if load.shape[0] > 1 else load[0]

@@ -105,8 +105,8 @@ def _picture(found: Diagnosis, p: Prediction) -> Section:
     plot = stacked([(f"force [{found.given.units.force}]", _curves(found, p, use))], "time [s]", height=340)
     _shaded(plot, _spans(found, 0), float(p.time[use][0]), float(p.time[use][-1]))
     caption = (
-        f"{p.source}, where the refitted model is off most. A model's force is what it would have needed for the measured motion; "
-        "shaded: where the mismatch was located."
+        f"{p.source}, where the refitted model is off most. A model's force is what it would have needed for the measured "
+        "motion; shaded: where the mismatch was located."
     )
     return Section("The difference", (figure(plot, caption),))
 

@@ -1,0 +1,136 @@
+"""Long recordings: causes are looked for in an excerpt and confirmed on everything.
+
+Screening and growing fit hundreds of models, whose cost is proportional to the number of samples; what they find needs the
+spans in which force is missing and, beside these, quiet ones, which refute an effect that would act there too. The recordings
+are cut into cells of a second or so; half of the excerpt are cells spread evenly over the recordings, half those in which the
+refitted nominal model lacks most. What was found is then fitted anew to all samples, and the share of the missing force that
+it explains there is stated beside the share in the excerpt: where both agree the excerpt did no harm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..model import Model
+from ..record import Array, Index
+from .grow import Growth, free_names, refit
+from .track import Track
+
+__all__ = ["MOST", "Excerpt", "confirmed", "excerpt"]
+
+MOST = 20_000
+"""Samples above which causes are looked for in an excerpt."""
+_CELL = 1000  # samples
+_SETTLED = 12.0  # times the observer's settling that a cell lasts at least
+_FIRST_FIT = 4  # iterations of the fit that tells where force is missing
+
+
+@dataclass(frozen=True, eq=False)
+class Excerpt:
+    """Parts of long recordings.
+
+    Attributes:
+        tracks: the parts, followed as the whole ones were.
+        whole: everything, at the same bandwidths.
+        n_kept: samples in the parts.
+        n_all: samples in everything.
+    """
+
+    tracks: tuple[Track, ...]
+    whole: tuple[Track, ...]
+    n_kept: int
+    n_all: int
+
+    @property
+    def text(self) -> str:
+        """What was done, in a sentence."""
+        return (
+            f"causes were looked for in {self.n_kept} of {self.n_all} samples: half of them spread evenly over the recordings, "
+            "half where the refitted nominal model lacks most force; what was found was fitted to all of them"
+        )
+
+
+def excerpt(tracks: Sequence[Track], nominal: Model, most: int = MOST) -> Excerpt | None:
+    """About ``most`` samples of the recordings that hold what is missing and what is quiet; None where they aren't longer.
+
+    Args:
+        tracks: the same recordings, followed at several bandwidths.
+        nominal: with values that a fit can start from.
+        most: samples.
+    """
+    n_all = sum(run.effort.shape[0] for run in tracks[0].runs)
+    if n_all <= 1.25 * most:
+        return None
+    step = float(np.median(np.concatenate([run.step for run in tracks[0].runs])))
+    length = max(_CELL, math.ceil(_SETTLED * 6.0 / (tracks[0].bandwidth * step)))
+    cells = _cells(tracks[0], min(length, most // 4))
+    kept = _chosen(_energy(tracks[len(tracks) // 2], nominal, cells, most), max(most // length, 4))
+    spans = _joined(cells[kept])
+    parts = tuple(_restricted(track, spans) for track in tracks)
+    return Excerpt(parts, tuple(tracks), sum(run.effort.shape[0] for run in parts[0].runs), n_all)
+
+
+def _cells(track: Track, length: int) -> Index:
+    """Run, first and last interval (exclusive) of each cell, shape ``(n_cells, 3)``."""
+    found = []
+    for k, run in enumerate(track.runs):
+        n = run.effort.shape[0]
+        cuts = np.linspace(0, n, max(n // length, 1) + 1).astype(np.int64)
+        found += [(k, int(first), int(last)) for first, last in pairwise(cuts)]
+    return np.array(found, dtype=np.int64)
+
+
+def _energy(track: Track, nominal: Model, cells: Index, most: int) -> Array:
+    """Mean square of the force that ``nominal``, fitted to evenly spread cells, lacks in each cell [F^2]."""
+    even = np.unique(np.linspace(0, len(cells) - 1, max(most // int(np.max(cells[:, 2] - cells[:, 1])), 4)).astype(np.int64))
+    fitted = _restricted(track, cells[even]).fit(nominal, free_names(nominal), _FIRST_FIT).model
+    lacking = track.padded(track.residual(fitted))
+    return np.array([float(np.mean(lacking[k][first:last] ** 2)) for k, first, last in cells.tolist()])
+
+
+def _chosen(energy: Array, n_kept: int) -> Index:
+    """Numbers of the cells: half spread evenly, half those with most energy, ascending."""
+    n = energy.shape[0]
+    even = np.unique(np.linspace(0, n - 1, max(n_kept // 2, 2)).round().astype(np.int64))
+    most = [k for k in np.argsort(energy)[::-1].tolist() if k not in set(even.tolist())]
+    return np.sort(np.concatenate([even, np.array(most[: max(n_kept - even.size, 0)], dtype=np.int64)]))
+
+
+def _joined(cells: Index) -> Index:
+    """The cells, neighbours made one."""
+    found: list[list[int]] = []
+    for run, first, last in cells.tolist():
+        if found and found[-1][0] == run and found[-1][2] == first:
+            found[-1][2] = last
+        else:
+            found.append([run, first, last])
+    return np.array(found, dtype=np.int64)
+
+
+def _restricted(track: Track, spans: Index) -> Track:
+    """The parts of the track that ``spans`` name."""
+    held = replace(track, runs=(), time=(), record=(), noise=())
+    for k, first, last in spans.tolist():
+        held = held.with_run(track.runs[k].part(first, last), track.time[k][first:last], track.record[k], track.noise[k])
+    return held
+
+
+def confirmed(found: Excerpt, growth: Growth) -> tuple[Growth, str]:
+    """What was grown on the excerpt, fitted to all samples, and what that says about the excerpt.
+
+    The steps keep their figures, which are those of the excerpt.
+    """
+    track = next(each for each in found.whole if each.bandwidth == growth.track.bandwidth)
+    here = growth.end.excess / max(growth.begin.excess, 1e-300)
+    begin = refit(track, growth.begin.fit.model, max_iterations=4)
+    end = refit(track, growth.end.fit.model, max_iterations=4) if growth.steps else begin
+    left = end.excess / max(begin.excess, 1e-300)
+    text = found.text
+    if growth.steps:
+        text += f"; it leaves {100.0 * left:.3g} % of what is missing there, {100.0 * here:.3g} % in the excerpt"
+    return replace(growth, track=track, begin=begin, end=end), text
