@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .errors import InputError
 from .model import Model
 from .record import Array
 from .simulate import Simulator, substeps
@@ -84,6 +85,23 @@ class SimulatedAxis:
     def position(self) -> float:
         """True position [x]."""
         return self._simulator.position
+
+    def become(self, model: Model) -> None:
+        """Go on with other values, from where the axis is and as it moves.
+
+        Raises:
+            InputError: ``model`` has another structure.
+        """
+        before = self._simulator
+        same = [held.effect for held in model.terms] == [held.effect for held in self._model.terms]
+        simulator = Simulator(model) if same and model.plant is self._plant else None
+        if simulator is None or simulator.friction_state.shape != before.friction_state.shape:
+            raise InputError("model", "has another plant or other terms than the axis", "change values only")
+        simulator.states, simulator.friction_state, simulator.memory = before.states, before.friction_state, before.memory
+        simulator.applied, simulator.time = before.applied, before.time
+        self._model, self._simulator = model, simulator
+        self._plant_values = np.array(model.plant_values, dtype=np.float64)
+        self._substeps.clear()
 
     def _encoder(self, position: float) -> float:
         """One reading of the encoder at ``position`` [x]."""

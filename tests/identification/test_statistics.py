@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.identification.statistics import bartlett_lag, sandwich_covariance
+from fric_nodes.identification.statistics import bartlett_lag, by_parts, noise_of, resolution_of, sandwich_covariance
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -78,3 +78,73 @@ def test_the_lag_grows_with_the_correlation_and_stays_below_the_record() -> None
     assert bartlett_lag(np.cumsum(rng.standard_normal(40))) <= 10
     assert bartlett_lag(np.zeros(100)) == 0
     assert bartlett_lag(np.ones(2)) == 0
+
+
+def test_intervals_of_a_short_correlated_series_hold_the_mean() -> None:
+    rng = np.random.default_rng(7)
+    n, trials, hits = 120, 1000, 0
+    for _ in range(trials):
+        series = ar1(n + 50, 0.5, rng)[50:]
+        mean = float(np.mean(series))
+        hits += abs(mean) <= 1.645 * np.sqrt(sandwich_covariance(np.ones((n, 1)), series - mean, np.ones(n), START)[0, 0])
+    # Without the allowance for the window it is 0.82.
+    assert 0.835 <= hits / trials <= 0.93
+
+
+def test_gaps_neither_add_nor_take_correlation() -> None:
+    rng = np.random.default_rng(8)
+    series = ar1(20_000, 0.8, rng)
+    gaps = rng.random(20_000) < 0.3
+    assert bartlett_lag(np.where(gaps, 0.0, series)) == pytest.approx(bartlett_lag(series), rel=0.1)
+
+
+def test_parts_of_white_residuals_give_the_textbook_covariance() -> None:
+    rng = np.random.default_rng(9)
+    found = []
+    for _ in range(40):
+        jacobian = rng.standard_normal((4000, 2)) @ np.array([[1.0, 0.5], [0.0, 1e-3]])
+        residual = 0.7 * rng.standard_normal(4000)
+        parts = np.split(np.arange(4000), 40)
+        information = np.array([jacobian[part].T @ jacobian[part] for part in parts])
+        score = np.array([jacobian[part].T @ residual[part] for part in parts])
+        textbook = 0.7**2 * np.linalg.inv(jacobian.T @ jacobian)
+        found.append(np.diag(by_parts(information, score)) / np.diag(textbook))
+    # Student's quantile with some 39 degrees of freedom over the normal one, squared.
+    np.testing.assert_allclose(np.mean(found, axis=0), 1.06, atol=0.1)
+
+
+def test_parts_cover_where_few_parts_carry_the_estimate() -> None:
+    rng = np.random.default_rng(10)
+    # Three of thirty parts hold nearly all of the information: their scores at the estimate show less than their noise.
+    size = np.where(np.arange(30) < 3, 6.0, 1.0)
+    hits, plain = 0, 0
+    for _ in range(1500):
+        measured = rng.standard_normal(30)
+        estimate = float(size @ measured / (size @ size))
+        score = size * (measured - estimate * size)
+        hits += abs(estimate) <= 1.645 * np.sqrt(by_parts((size**2)[:, None, None], score[:, None])[0, 0])
+        plain += abs(estimate) <= 1.645 * np.sqrt(np.sum(score**2)) / (size @ size)
+    assert plain / 1500 < 0.82
+    assert 0.84 <= hits / 1500 <= 0.95
+    assert hits > plain + 75
+
+
+@pytest.mark.parametrize(("step", "expected"), [(1e-7, 1e-7), (0.25, 0.25)])
+def test_the_step_of_a_rounded_signal(step: float, expected: float) -> None:
+    rng = np.random.default_rng(11)
+    smooth = 300.0 * step * np.sin(np.linspace(0.0, 40.0, 5000))
+    rounded = step * np.round((smooth + 0.3 * step * rng.standard_normal(5000)) / step) + 0.1 * step
+    assert resolution_of(rounded) == pytest.approx(expected, rel=1e-6)
+    assert resolution_of(smooth) == 0.0
+    assert resolution_of(smooth + 1e-3 * step * rng.standard_normal(5000)) == 0.0
+
+
+def test_what_is_not_rounded_has_no_step_and_what_rests_neither() -> None:
+    assert resolution_of(np.zeros(100)) == 0.0
+    assert resolution_of(np.full(100, 0.123)) == 0.0
+
+
+def test_white_noise_is_found_under_a_motion() -> None:
+    t = np.linspace(0.0, 10.0, 5000)
+    noisy = np.sin(2.0 * np.pi * t) + 1e-4 * np.random.default_rng(12).standard_normal(5000)
+    assert noise_of(noisy) == pytest.approx(1e-4, rel=0.1)

@@ -15,6 +15,9 @@ from fric_nodes.model_file import read_model
 from fric_nodes.nodes.convert import model_from_message
 from fric_nodes.nodes.identifier import IdentifierNode
 from fric_nodes.record import Record, Units
+from rcl_interfaces.msg import Parameter as RosParameter
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
@@ -198,4 +201,82 @@ def test_a_model_file_that_cannot_be_used(graph: Any, tmp_path: Path) -> None:
     status, out, error = graph.finish(graph.start_node("identifier", model_file=tmp_path / "bad.yaml"))
     assert (status, out) == (2, "")
     assert error.startswith(f"identifier: {tmp_path / 'bad.yaml'}")
+    assert error.count("\n") == 1
+
+
+# Both axes stick exactly; the second is what a dry guideway makes of the first.
+AXIS = """format: fric-model/1
+joint: axis
+units: {{position: m, force: N}}
+plant: {{type: rigid, mass: 2.0}}
+terms:
+  - {{effect: coulomb, force: {level}}}
+  - {{effect: viscous, coefficient: 40.0}}
+  - {{effect: bias, force: 2.0}}
+"""
+CHANGE_AT = 12.0  # [s]
+
+
+@pytest.mark.parametrize("estimator", ["rls", "ekf", "ukf"])
+def test_it_follows_a_step_of_friction_in_a_running_graph(graph: Any, tmp_path: Path, estimator: str) -> None:
+    for name, level in (("before", 6.0), ("after", 9.0)):
+        (tmp_path / f"{name}.yaml").write_text(AXIS.format(level=level))
+    listener = Listener(graph)
+    found = identifier(graph, estimator=estimator, publish_period=0.05)
+    states: list[float] = []
+    changed: list[float] = []
+    done: list[float] = []
+    setter = graph.node("setter")
+    client = setter.create_client(SetParameters, "/plant/set_parameters")
+
+    def on_state(state: JointState) -> None:
+        states.append(state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec)
+        if states[-1] >= CHANGE_AT and not changed:
+            value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=str(tmp_path / "after.yaml"))
+            answer = client.call_async(SetParameters.Request(parameters=[RosParameter(name="model_file", value=value)]))
+            answer.add_done_callback(lambda _: done.append(states[-1]))
+            changed.append(states[-1])
+
+    setter.create_subscription(JointState, "joint_states", on_state, 1000)
+    graph.spin(setter)
+    common = {"lock_step": "true", "period": 0.002}
+    graph.start_node("excitation", kinds="[multisine]", start_delay=0.2, **common)
+    graph.start_node("pid", kp=4000.0, kd=120.0, use_feedforward="false", **common)
+    model = tmp_path / "before.yaml"
+    # Excitation, controller, identifier and the one that changes the friction listen to the plant from its first state.
+    graph.start_node(
+        "plant", model_file=model, force_noise=0.3, duration=22.0, wait_for_subscribers=4, resolution=1e-7, **common
+    )
+    graph.until(lambda: states and states[-1] >= 21.9, "the end of the motion", limit=300.0)
+    graph.until(lambda: found.newest >= 21.5e9, "the last samples")
+    graph.until(lambda: done, "the change")
+    times = [estimate.header.stamp.sec + 1e-9 * estimate.header.stamp.nanosec for estimate in listener.estimates]
+    level = np.array([values(estimate)["coulomb.force"] for estimate in listener.estimates])
+    assert level[np.searchsorted(times, changed[0]) - 1] == pytest.approx(6.0, rel=0.05)
+    # The plant goes on while the change is on its way; it has happened when the answer is there.
+    late = level[np.searchsorted(times, done[0] + 3.0) :]
+    assert late.size > 20
+    assert late == pytest.approx(9.0, rel=0.05)
+
+
+@pytest.mark.parametrize("estimator", ["ekf", "ukf"])
+def test_from_a_recording_by_kalman_filter(graph: Any, tmp_path: Path, estimator: str) -> None:
+    listener = Listener(graph)
+    bag = write_record(recorded(), tmp_path / "bag")
+    identifier(graph, estimator=estimator)
+    play(graph, bag)
+    graph.until(lambda: listener.estimates and listener.estimates[-1].header.stamp.sec >= 20, "the last estimate")
+    last = listener.estimates[-1]
+    assert values(last) == pytest.approx(TRUTH, rel=0.03)
+    assert all(last.excited)
+    assert len(last.covariance) == 16
+    model = model_from_message(listener.models[-1])
+    assert set(model.standard_errors) == set(TRUTH)
+    assert "Kalman" in model.provenance["message"]
+
+
+def test_an_unknown_estimator_is_refused(graph: Any) -> None:
+    status, out, error = graph.finish(graph.start_node("identifier", estimator="magic"), limit=120.0)
+    assert (status, out) == (2, "")
+    assert "rls, ekf, ukf" in error
     assert error.count("\n") == 1

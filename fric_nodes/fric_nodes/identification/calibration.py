@@ -133,15 +133,23 @@ class Calibration:
         truth: shape ``(n_parameters,)``.
         estimates: shape ``(n_recordings, n_parameters)``.
         errors: standard errors, same shape; NaN where the method gave none.
+        ends: of intervals that aren't those of the standard errors, shape ``(2, n_recordings, n_parameters)``, or None.
+        probability: of these.
     """
 
     names: tuple[str, ...]
     truth: Array
     estimates: Array
     errors: Array
+    ends: Array | None = None
+    probability: float = 0.9
 
     def coverage(self, probability: float = 0.9) -> Array:
         """Share of recordings whose interval of that probability holds the truth, per parameter; no interval is a miss."""
+        if self.ends is not None:
+            if probability != self.probability:
+                raise ValueError(f"the intervals are of probability {self.probability:g}, not {probability:g}")
+            return np.asarray(np.mean((self.ends[0] <= self.truth) & (self.truth <= self.ends[1]), axis=0))
         wide = float(ndtri(0.5 + 0.5 * probability)) * self.errors
         return np.asarray(np.mean(np.abs(self.estimates - self.truth) <= wide, axis=0))
 
@@ -157,20 +165,31 @@ class Calibration:
         return np.asarray(np.std(self.estimates, axis=0, ddof=1) / np.nanmedian(self.errors, axis=0))
 
 
-def _one(axis: TestAxis, method: str, options: Options, seed: int) -> tuple[Array, Array]:
+def _one(axis: TestAxis, method: str, options: Options, kind: str, seed: int) -> tuple[Array, Array, Array]:
+    """Estimate, standard errors and ends of the intervals, ``(2, n_parameters)``."""
     from . import METHODS
+    from .uncertainty import intervals
 
-    found = METHODS[method].fit(axis.start, [recording(axis, seed)], options)
+    records = [recording(axis, seed)]
+    found = METHODS[method].fit(axis.start, records, options)
     names = _free(axis)
-    errors = [found.model.standard_errors.get(name, math.nan) for name in names]
-    return np.array([found.model.value(name) for name in names]), np.array(errors)
+    estimate = np.array([found.model.value(name) for name in names])
+    errors = np.array([found.model.standard_errors.get(name, math.nan) for name in names])
+    ends = np.full((2, len(names)), math.nan)
+    if kind != "sandwich":
+        each = intervals(found, records, options, kind)
+        at = [names.index(name) for name in each.names]
+        ends[:, at], errors[at] = (each.lower, each.upper), each.standard_errors
+    return estimate, errors, ends
 
 
 def _free(axis: TestAxis) -> tuple[str, ...]:
     return tuple(p.name for p in axis.truth.parameters() if not p.declaration.shape and p.name != "load_share")
 
 
-def calibrate(axis: TestAxis, method: str, seeds: Sequence[int], options: Options, n_processes: int = 1) -> Calibration:
+def calibrate(
+    axis: TestAxis, method: str, seeds: Sequence[int], options: Options, n_processes: int = 1, kind: str = "sandwich"
+) -> Calibration:
     """Fit a recording of ``axis`` for each seed, by ``method``.
 
     Args:
@@ -179,8 +198,9 @@ def calibrate(axis: TestAxis, method: str, seeds: Sequence[int], options: Option
         seeds: one recording each.
         options: of the fits.
         n_processes: that share the work; 1: this one.
+        kind: of the intervals, see :data:`fric_nodes.identification.uncertainty.KINDS`.
     """
-    work = partial(_one, axis, method, options)
+    work = partial(_one, axis, method, options, kind)
     if n_processes == 1:
         rows = [work(seed) for seed in seeds]
     else:
@@ -190,4 +210,5 @@ def calibrate(axis: TestAxis, method: str, seeds: Sequence[int], options: Option
             rows = list(pool.map(work, seeds, chunksize=4))
     names = _free(axis)
     truth = np.array([axis.truth.value(name) for name in names])
-    return Calibration(names, truth, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
+    estimates, errors, ends = (np.array([row[k] for row in rows]) for k in range(3))
+    return Calibration(names, truth, estimates, errors, None if kind == "sandwich" else ends.swapaxes(0, 1))

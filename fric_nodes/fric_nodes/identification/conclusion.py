@@ -55,5 +55,6 @@ def concluded(method: str, fitted: Fitted, records: Sequence[Record], options: O
         status=trouble or status,
         warnings=(*fitted.messages, *warnings),
         notes=fitted.found.notes,
-        train=score(model, records, options, fitted.found),
+        # Structures are compared by equations that are the same for all of them.
+        train=score(model, records, options, None if model.has_slip_dynamics else fitted.found),
     )

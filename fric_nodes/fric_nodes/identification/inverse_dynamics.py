@@ -19,13 +19,14 @@ import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
 from ..model import Model
-from ..record import Array, Index, Mask, Record
+from ..record import Array, Mask, Record
 from .conclusion import Fitted, concluded
 from .equations import Equations, equations
+from .filter_bias import residual_of_filters
 from .free_parameters import FreeParameters, candidates
 from .result import Identification, IdentificationError, Method, Options
 from .scoring import driving_force, force_along
-from .statistics import sandwich_covariance
+from .statistics import covariance_by_parts
 from .verdict import collinear
 
 __all__ = ["METHOD", "fit", "fit_force"]
@@ -57,6 +58,11 @@ def weights(residual: Array, use: Mask, robust: bool) -> Array:
     if not robust or scale == 0.0:
         return use.astype(np.float64)
     return use.astype(np.float64) * np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), 1e-300))
+
+
+def rows_of_fit(model: Model, found: Equations) -> Mask:
+    """The rows that tell about ``model``: all if its friction is defined at rest, else those clear of it."""
+    return np.ones_like(found.clear) if model.has_slip_dynamics else found.clear
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +109,7 @@ def _cost(residual: Array, use: Mask, robust: bool) -> float:
 def _search_static(model: Model, found: Equations, free: FreeParameters, robust: bool) -> Model:
     """The static structure with linear parameters solved for and nonlinear ones chosen on their grid."""
     linear, nonlinear = free.only(True), free.only(False)
-    use = found.sliding
+    use = found.clear
     best = _fit_linear(model, found, linear, use, robust)
     level = float(np.median(np.abs(found.force[use])))
     declared = list(model.parameters())
@@ -182,7 +188,7 @@ def _typical(model: Model, found: Equations, free: FreeParameters) -> Array:
 
 def fit_force(model: Model, records: Sequence[Record], options: Options) -> Fitted:
     """The fit itself, for this method and as the start of others."""
-    found = equations(list(records), options)
+    found = equations(list(records), options, model)
     if int(np.sum(found.sliding)) < 2 * len(model.names):
         raise IdentificationError(
             records[0].source,
@@ -192,38 +198,61 @@ def fit_force(model: Model, records: Sequence[Record], options: Options) -> Fitt
     free = FreeParameters.of(model, options)
     static = model.with_terms(held for held in model.terms if held.effect.slip is None)
     static_free = FreeParameters.of(static, _for_structure(options, static))
-    twins = collinear(static, regressors(static, found)[:, static_free.index], static_free, found.sliding)
+    twins = collinear(static, regressors(static, found)[:, static_free.index], static_free, found.clear)
     messages = [twin.message for twin in twins]
     free = free.without({twin.name for twin in twins})
     static_free = static_free.without({twin.name for twin in twins})
     static = _search_static(static, found, static_free, options.robust)
     by_name = {parameter.name: parameter.value for parameter in static.parameters()}
     model = model.with_values(np.array([by_name.get(p.name, p.value) for p in model.parameters()]))
-    use = found.sliding
     if model.has_slip_dynamics:
         model = _search_dynamic(model, found, free.without(set(static_free.names)), options.robust)
-        use = np.ones_like(found.sliding)
+    use = rows_of_fit(model, found)
     model, residual, jacobian, weight = _refine(model, found, free, use, options.robust)
     size = np.linalg.norm(jacobian[use], axis=0) * np.abs(model.values[free.index])
     inside = ~free.at_bound(model) & (size > 1e-9 * np.max(size, initial=0.0))
     covariance = np.full((len(free.names), len(free.names)), np.nan)
-    covariance[np.ix_(inside, inside)] = sandwich_covariance(
-        jacobian[np.ix_(use, inside)], residual[use], weight[use], _starts_within(found, use)
-    )
+    model, known = _without_filter_bias(model, found, free, jacobian, weight)
+    covariance[np.ix_(inside, inside)] = covariance_by_parts(jacobian[:, inside], residual - known, weight, found.starts)
     return Fitted(model, free, covariance, found, messages)
+
+
+def filter_residual(model: Model, found: Equations) -> Array:
+    """What filters leave in the equations at the values of ``model``, ``(n_rows,)``: nothing without slip dynamics."""
+    if model.has_slip_dynamics and not model.has_command_path:
+        residual = residual_of_filters(model, found)
+        if np.all(np.isfinite(residual)):
+            return residual
+    return np.zeros(found.force.shape[0])
+
+
+def _without_filter_bias(
+    model: Model, found: Equations, free: FreeParameters, jacobian: Array, weight: Array
+) -> tuple[Model, Array]:
+    """``model`` less what the filters do to its values, and the part of the residual that is theirs, ``(n_rows,)``.
+
+    The model is left as it is where that can't be told or leads out of bounds.
+    """
+    residual = filter_residual(model, found)
+    inside = ~free.at_bound(model)
+    size = np.linalg.norm(jacobian[:, inside], axis=0)
+    root = np.sqrt(weight)
+    scaled = root[:, None] * jacobian[:, inside] / np.where(size > 0.0, size, 1.0)
+    # The Jacobian is that of measured minus predicted.
+    off = -np.linalg.lstsq(scaled, root * residual, rcond=1e-9)[0] / np.where(size > 0.0, size, 1.0)
+    values = model.values
+    values[free.index[inside]] -= off
+    within = np.all((values[free.index] > free.lower) & (values[free.index] < free.upper) | ~inside)
+    if not np.any(residual) or not within:
+        return model, np.zeros_like(residual)
+    return model.with_values(values), residual + jacobian[:, inside] @ off
 
 
 def _for_structure(options: Options, model: Model) -> Options:
     """The options without names that ``model`` doesn't have."""
     held = tuple(name for name in options.held if name in model.names)
-    return Options(held=held, freed=tuple(name for name in options.freed if name in model.names))
-
-
-def _starts_within(found: Equations, use: Mask) -> Index:
-    """First row of each stretch, and of each run of used rows, among the used rows."""
-    row = np.flatnonzero(use)
-    fresh = np.isin(row, found.starts) | (np.diff(row, prepend=row[0]) > 1)
-    return np.flatnonzero(fresh)
+    freed = tuple(name for name in options.freed if name in model.names)
+    return Options(held=held, freed=freed, bounds=tuple(bound for bound in options.bounds if bound[0] in model.names))
 
 
 def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
@@ -241,4 +270,5 @@ METHOD = Method(
     needs="motion in both directions at several speeds and accelerations; position and force",
     source="Gautier 1997; Janot, Gautier, Brunot 2019",
     fit=fit,
+    predicts="force",
 )

@@ -22,8 +22,10 @@ model and not by the axis. That share is the regression of e on what the fast pa
 1.
 
 Standard errors: the sum of the scores s_k = e_k e'_k - d_k d'_k, with d the answer to the drawn noise and ' a derivative, is
-zero at the estimate. Its derivative is E'E' - D'D' in the mean, without the noise in E, and its variance is that of
-correlated scores (:mod:`fric_nodes.identification.statistics`), which holds what the drawn noise adds to the error as well.
+zero at the estimate. Its derivative is E'E' - D'D' in the mean, without the noise in E. Both are summed over parts of the
+recording longer than the correlation of the scores, and the covariance follows from these sums
+(:func:`fric_nodes.identification.statistics.by_parts`): the damping of bristles shows in a few instants in which sliding
+breaks loose, and each of them counts for much. What the drawn noise adds to the error is in the scores as well.
 
 The fit starts from the values of inverse dynamics and, since a Stribeck velocity or a stiffness has wrong valleys of its
 own, from others over their range; the best after a few steps goes on. Source: Ljung 1999, sections 7.2 and 7.4 (prediction
@@ -51,7 +53,7 @@ from .gauss_newton import Solution, minimise
 from .innovations import SETTLING, Run, excerpt, innovations, noise_of, runs_of
 from .problem import Problem
 from .result import Identification, Method, Options
-from .statistics import bartlett_lag, sandwich
+from .statistics import bartlett_lag, by_parts, definite, parts_of
 
 __all__ = ["METHOD", "fit", "problem"]
 
@@ -165,7 +167,6 @@ class _Fit:
             slopes[k] = (above[0] - below[0]) / (ahead[k] - behind[k])
             noise_slopes[k] = (above[1] - below[1]) / (ahead[k] - behind[k])
         score = slopes * plain
-        information = slopes @ slopes.T
         if self.drawn:
             noise_score = np.einsum("knt,nt->kt", noise_slopes, changed)
             score = score - share * noise_score
@@ -173,21 +174,20 @@ class _Fit:
                 # The size of the noise is itself an estimate, from the same innovations.
                 excess = plain**2 - share * np.sum(changed**2, axis=0)
                 score = score - np.outer(np.sum(noise_score, axis=1) / np.sum(changed**2), excess)
-            corrected = information - share * np.einsum("knt,lnt->kl", noise_slopes, noise_slopes)
-            information = _definite(corrected, information)
         lag = max(bartlett_lag(each) for each in score)
-        return sandwich(information, score.T, lag, starts) * np.outer(scale, scale)
-
-
-def _definite(corrected: Array, plain: Array) -> Array:
-    """``corrected``, of which noise may leave less than a twentieth of ``plain`` in some direction, kept above that."""
-    values, vectors = np.linalg.eigh(plain)
-    values = np.maximum(values, 1e-12 * values[-1])
-    root = vectors * np.sqrt(values)
-    inverse = (vectors / np.sqrt(values)).T
-    shares, directions = np.linalg.eigh(inverse @ corrected @ inverse.T)
-    inner = (directions * np.clip(shares, 0.05, None)) @ directions.T
-    return np.asarray(root @ inner @ root.T, dtype=np.float64)
+        parts = parts_of(score.shape[1], lag, starts)
+        sums = np.add.reduceat(score, parts, axis=1).T
+        whole = np.empty((2, parts.shape[0], n, n))
+        for number, (first, last) in enumerate(zip(parts, [*parts[1:], score.shape[1]], strict=True)):
+            part = slice(first, last)
+            whole[0, number] = slopes[:, part] @ slopes[:, part].T
+            whole[1, number] = np.einsum("knt,lnt->kl", noise_slopes[:, :, part], noise_slopes[:, :, part])
+        plain_sum, noise_sum = np.sum(whole, axis=1)
+        corrected = plain_sum - share * noise_sum
+        kept_whole = definite(corrected, plain_sum)
+        # What keeps the whole definite is shared among the parts.
+        kept = whole[0] - share * whole[1] + (kept_whole - corrected) / parts.shape[0]
+        return by_parts(kept, sums) * np.outer(scale, scale)
 
 
 def _rated(square: float, known: float) -> float:
@@ -322,4 +322,5 @@ METHOD = Method(
     needs="as inverse dynamics, and a position signal that is fine beside what the force noise moves in one sample",
     source="Ljung 1999, sections 7.2 and 7.4",
     fit=fit,
+    predicts="position",
 )

@@ -9,10 +9,10 @@ import numpy as np
 from ..model import Model
 from ..record import Array, Record
 from ..simulate import Predictor, intervals, respond, simulate
-from .equations import Equations, Stretch, equations
+from .equations import FINER, Equations, Motion, Stretch, equations
 from .result import Options, Score
 
-__all__ = ["driving_force", "force_along", "free_run", "score"]
+__all__ = ["driving_force", "force_along", "force_over_intervals", "free_run", "score"]
 
 
 def score(model: Model, records: Sequence[Record], options: Options, found: Equations | None = None) -> Score:
@@ -54,22 +54,28 @@ def driving_force(model: Model, found: Equations) -> Array:
     def acting(stretch: Stretch) -> Array:
         given = respond(model, intervals(stretch.effort, stretch.hold), stretch.sample_time)
         around = np.concatenate([given[:1], given, given[-1:]])
-        result: Array = 0.5 * (around[:-1] + around[1:])
-        return result
+        return stretch.smooth(0.5 * (around[:-1] + around[1:]))
 
     return found.rows(acting)
 
 
 def force_along(model: Model, stretch: Stretch) -> Array:
     """Force that ``model`` needs along the motion of a stretch at full rate [F], shape ``(n,)``."""
+    if not model.has_slip_dynamics:
+        return _along(model, stretch.motion)
+    interval = force_over_intervals(model, stretch)
+    around = np.concatenate([interval[:1], interval, interval[-1:]])
+    return np.asarray(0.5 * (around[:-1] + around[1:]), dtype=np.float64)
+
+
+def force_over_intervals(model: Model, stretch: Stretch) -> Array:
+    """Mean force that ``model`` needs from each sample to the next [F], ``(n - 1,)``, its friction led along the finer path."""
+    return np.asarray(np.mean(_along(model, stretch.fine_motion).reshape(-1, FINER), axis=1), dtype=np.float64)
+
+
+def _along(model: Model, motion: Motion) -> Array:
     effort, _ = Predictor(model).run(
-        stretch.time,
-        stretch.position,
-        stretch.velocity,
-        stretch.acceleration,
-        stretch.sample_time,
-        stretch.load,
-        stretch.temperature,
+        motion.time, motion.position, motion.velocity, motion.acceleration, motion.step, motion.load, motion.temperature
     )
     return effort
 

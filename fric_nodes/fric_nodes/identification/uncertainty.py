@@ -31,7 +31,7 @@ from .profile import profile
 from .result import Identification, IdentificationError, Method, Options
 from .scoring import driving_force
 
-__all__ = ["KINDS", "Uncertainty", "assess", "over_recordings", "over_restarts", "problem_of"]
+__all__ = ["KINDS", "Intervals", "Uncertainty", "assess", "intervals", "over_recordings", "over_restarts", "problem_of"]
 
 KINDS = ("sandwich", "bootstrap", "profile")
 """Ways to find intervals."""
@@ -43,7 +43,7 @@ _DIFFERENCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
+class Intervals:
     """Intervals of the fitted parameters; arrays of shape ``(n_parameters,)``, in SI.
 
     Attributes:
@@ -54,8 +54,6 @@ class Uncertainty:
         standard_errors: of this kind.
         lower: infinite where the recordings set no limit.
         upper: infinite where the recordings set no limit.
-        restarts: standard deviation over fits from other starts.
-        recordings: standard deviation over the recordings fitted one by one; NaN with one recording.
         notes: what else to know.
     """
 
@@ -66,9 +64,20 @@ class Uncertainty:
     standard_errors: Array
     lower: Array
     upper: Array
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty(Intervals):
+    """Intervals, and the spread of the estimates beside them.
+
+    Attributes:
+        restarts: standard deviation over fits from other starts.
+        recordings: standard deviation over the recordings fitted one by one; NaN with one recording.
+    """
+
     restarts: Array
     recordings: Array
-    notes: tuple[str, ...]
 
 
 def _free(result: Identification, options: Options) -> FreeParameters:
@@ -78,22 +87,24 @@ def _free(result: Identification, options: Options) -> FreeParameters:
 
 
 def _of_inverse_dynamics(model: Model, free: FreeParameters, found: Equations, robust: bool) -> Problem:
-    use = np.ones_like(found.sliding) if model.has_slip_dynamics else found.sliding
+    use = inverse_dynamics.rows_of_fit(model, found)
     values = model.values
     scale = np.abs(values[free.index])
     scale[scale == 0.0] = 1.0
+
+    # What the filters leave in the equations at the estimate is no misfit: it has been taken off the values.
+    left = inverse_dynamics.filter_residual(model, found)
 
     def error(point: Array) -> Array:
         trial = values.copy()
         trial[free.index] = point * scale
         moved = model.with_values(trial)
-        return np.asarray(driving_force(moved, found) - inverse_dynamics.predicted(moved, found), dtype=np.float64)
+        return np.asarray(driving_force(moved, found) - inverse_dynamics.predicted(moved, found) - left, dtype=np.float64)
 
-    root = np.sqrt(inverse_dynamics.weights(error(values[free.index] / scale), use, robust))[use]
-    row = np.flatnonzero(use)
-    starts = np.flatnonzero(np.isin(row, found.starts) | (np.diff(row, prepend=row[0]) > 1))
+    root = np.sqrt(inverse_dynamics.weights(error(values[free.index] / scale), use, robust))
     point, lower, upper = values[free.index] / scale, free.lower / scale, free.upper / scale
-    return Problem(free.names, lambda at: root * error(at)[use], point, lower, upper, scale, starts)
+    # Rows that aren't used stay, as zeros, so that blocks are blocks of time.
+    return Problem(free.names, lambda at: root * error(at), point, lower, upper, scale, found.starts)
 
 
 def problem_of(result: Identification, records: Sequence[Record], options: Options) -> Problem:
@@ -102,7 +113,7 @@ def problem_of(result: Identification, records: Sequence[Record], options: Optio
     Raises:
         InputError: its method isn't a least-squares fit of a recording.
     """
-    free, found = _free(result, options), equations(list(records), options)
+    free, found = _free(result, options), equations(list(records), options, result.model)
     if result.method == inverse_dynamics.METHOD.id:
         return _of_inverse_dynamics(result.model, free, found, options.robust)
     if result.method == output_error.METHOD.id:
@@ -121,7 +132,9 @@ def _bootstrap(result: Identification, problem: Problem, records: Sequence[Recor
     if result.method != output_error.METHOD.id:
         found = block_bootstrap(problem, n_replicates=_REPLICATES)
         return found, f"{found.estimates.shape[0]} replicates from blocks of {found.length} equations"
-    draws = output_error.problem(result.model, _free(result, options), equations(list(records), options), options.horizon)[1]
+    draws = output_error.problem(
+        result.model, _free(result, options), equations(list(records), options, result.model), options.horizon
+    )[1]
     estimates = []
     for moved in islice(draws, _REPLICATES):
         answer = minimise(
@@ -141,14 +154,39 @@ def _bootstrap(result: Identification, problem: Problem, records: Sequence[Recor
 def assess(
     result: Identification, records: Sequence[Record], options: Options, kind: str = "sandwich", probability: float = 0.9
 ) -> Uncertainty:
-    """Intervals for the parameters of ``result``, which was fitted to ``records`` with ``options``.
+    """Intervals for the parameters of ``result``, which was fitted to ``records`` with ``options``, and the spread beside them.
 
     Raises:
         InputError: ``kind`` isn't known, or not to be had for this method.
     """
+    _check(kind)
+    problem = problem_of(result, records, options)
+    found = _intervals(problem, result, records, options, kind, probability)
+    restarts = over_restarts(problem)
+    recordings = over_recordings(result, records, options, problem.names)
+    return Uncertainty(**vars(found), restarts=restarts, recordings=recordings)
+
+
+def intervals(
+    result: Identification, records: Sequence[Record], options: Options, kind: str = "sandwich", probability: float = 0.9
+) -> Intervals:
+    """The intervals of :func:`assess` alone.
+
+    Raises:
+        InputError: as there.
+    """
+    _check(kind)
+    return _intervals(problem_of(result, records, options), result, records, options, kind, probability)
+
+
+def _check(kind: str) -> None:
     if kind not in KINDS:
         raise InputError("--uncertainty", f"'{kind}' is not known", f"use one of {', '.join(KINDS)}")
-    problem = problem_of(result, records, options)
+
+
+def _intervals(
+    problem: Problem, result: Identification, records: Sequence[Record], options: Options, kind: str, probability: float
+) -> Intervals:
     estimate = problem.point * problem.scale
     errors = np.array([result.model.standard_errors[name] for name in problem.names])
     wide = float(ndtri(0.5 + 0.5 * probability))
@@ -168,9 +206,7 @@ def assess(
             for end, side in ((lower[k], "below"), (upper[k], "above")):
                 if not math.isfinite(end):
                     notes.append(f"{problem.names[k]} has no limit {side}: these recordings don't set one")
-    restarts = over_restarts(problem)
-    recordings = over_recordings(result, records, options, problem.names)
-    return Uncertainty(kind, probability, problem.names, estimate, errors, lower, upper, restarts, recordings, tuple(notes))
+    return Intervals(kind, probability, problem.names, estimate, errors, lower, upper, tuple(notes))
 
 
 def over_restarts(problem: Problem, seed: int = 1) -> Array:

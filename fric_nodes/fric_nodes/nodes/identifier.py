@@ -18,7 +18,7 @@ from fric_interfaces.msg import FrictionEstimate, FrictionModel
 from fric_interfaces.srv import FreezeIdentification, ResetIdentification, SaveIdentification, StartIdentification
 
 from ..errors import InputError
-from ..identification.online import OnlineIdentifier, State
+from ..identification.online import ESTIMATORS, State, make_estimator
 from ..identification.result import Options
 from ..identification.start import start_model
 from ..model import Model
@@ -40,6 +40,13 @@ PARAMETERS = (
     NodeParameter("terms", ["coulomb", "viscous", "bias"], "effects to estimate when no model file is given"),
     NodeParameter("position_unit", "m", "unit of positions when no model file is given", choices=("m", "rad")),
     NodeParameter("force_unit", "N", "unit of efforts when no model file is given"),
+    NodeParameter(
+        "estimator",
+        "rls",
+        "rls: recursive least squares in blocks; ekf, ukf: Kalman filter on the friction state, sample by sample, with slip "
+        "dynamics and nonlinear parameters",
+        choices=ESTIMATORS,
+    ),
     NodeParameter("forgetting_time", 60.0, "how long informative motion counts", unit="s", lower=0.1, upper=1e9),
     NodeParameter("cutoff", 0.0, "low-pass filter on the position; 0: chosen from the rate", unit="Hz", lower=0.0),
     NodeParameter(
@@ -71,10 +78,10 @@ class IdentifierNode(OrderlyNode):
         file = settings.text("model_file")
         self._structure = read_model(file) if file else self._of_terms(settings.texts("terms"))
         self.counters: Counter[str] = Counter()
-        self._pairing = EffortPairing(settings.text("effort_hold"))
         self.newest = self._published_at = self._model_at = -1
         self._origin = 0
         self._unpublished = False
+        self._unstamped = False
         self._quiet_rounds = 0
         self._begin(self._structure, running=settings.flag("autostart"))
         self._estimates = self.create_publisher(FrictionEstimate, "friction/estimate", 10)
@@ -96,10 +103,12 @@ class IdentifierNode(OrderlyNode):
         return start_model(terms, self._joint or "axis", Units(settings.text("position_unit"), settings.text("force_unit")))
 
     def _begin(self, structure: Model, running: bool) -> None:
-        cutoff = self._settings.number("cutoff")
-        self._identifier = OnlineIdentifier(structure, self._forgetting_time, Options(cutoff=cutoff or None))
+        settings = self._settings
+        options = Options(cutoff=settings.number("cutoff") or None)
+        hold = settings.text("effort_hold")
+        self._identifier = make_estimator(settings.text("estimator"), structure, self._forgetting_time, options, hold)
         self._identifier.state = State.RUNNING if running else State.IDLE
-        self._pairing.clear()
+        self._pairing = EffortPairing(hold, at_stamp=self._identifier.averages_force)
 
     def work(self) -> None:
         """Take what has come and learn from it."""
@@ -132,6 +141,10 @@ class IdentifierNode(OrderlyNode):
             self.counters["refused: joint state"] += 1
             self.get_logger().warning(f"joint state refused: {error}", throttle_duration_sec=5.0)
             return
+        if sample.stamp and self._unstamped:
+            # In lock-step the first stamp is 0, which looks like none; time by the wall doesn't go with what follows.
+            self._pairing.clear()
+        self._unstamped = not sample.stamp
         self._pairing.state(Sample(sample.stamp or received, received, sample.position, sample.effort))
 
     def _learn(self, sample: Sample) -> None:
@@ -140,6 +153,7 @@ class IdentifierNode(OrderlyNode):
         if sample.time < self.newest:
             self._published_at = self._model_at = -1  # the machine, or the recording, was started again
         self.newest = sample.time
+        self._identifier.hold = self._pairing.hold
         self._unpublished |= self._identifier.update((sample.time - self._origin) * 1e-9, sample.position, sample.effort)
         period = self._settings.number("publish_period")
         if self._published_at < 0:
@@ -181,7 +195,7 @@ class IdentifierNode(OrderlyNode):
 
     def _model(self) -> Model:
         samples = str(self._identifier.samples_used)
-        provenance = {"method": "online, recursive least squares", "samples": samples}
+        provenance = {"method": f"online, {self._identifier.title}", "samples": samples}
         return replace(self._identifier.model(), joint=self._name_of_joint(), provenance=provenance)
 
     def _start(self, request: Any, response: Any) -> Any:

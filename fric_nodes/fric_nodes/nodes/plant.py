@@ -23,6 +23,7 @@ from std_msgs.msg import Float64
 from fric_interfaces.msg import StampedForce
 
 from ..axis import SimulatedAxis
+from ..errors import InputError
 from ..model_file import read_model
 from ..shared_files import config_file
 from .base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent, wall_clock
@@ -38,7 +39,13 @@ __all__ = ["PlantNode", "main"]
 PARAMETERS = (
     PERIOD,
     LOCK_STEP,
-    NodeParameter("model_file", "", "fric-model/1 file of the axis; empty: the demo axis that comes with the package"),
+    NodeParameter(
+        "model_file",
+        "",
+        "fric-model/1 file of the axis; empty: the demo axis that comes with the package; set to another file of the same "
+        "structure, the axis goes on with its values",
+        settable=True,
+    ),
     NodeParameter("resolution", 1e-7, "step of the encoder; 0: ideal", "m or rad", 0.0, 1.0),
     NodeParameter("position_noise", 0.0, "standard deviation of a reading of the encoder", "m or rad", 0.0, 1.0),
     NodeParameter("readings", 1, "readings of the encoder per sample; their mean is published", "", 1, 1000),
@@ -74,6 +81,7 @@ class PlantNode(LoopNode):
             force_limit=settings.number("force_limit"),
             seed=settings.integer("seed"),
         )
+        settings.when_changed(self._on_settings)
         # Compiled (or fetched from the cache) here and not at the first sample.
         self._axis.advance(0.0, 1e-12)
         self._axis.measure()
@@ -102,6 +110,16 @@ class PlantNode(LoopNode):
             self._watchdog = from_seconds(settings.number("watchdog_time"))
             self._fed = False
             self.create_timer(self.period, self._tick)
+
+    def _on_settings(self, changed: set[str]) -> None:
+        if "model_file" not in changed:
+            return
+        try:
+            self._axis.become(read_model(_model_path(self.settings.text("model_file"))))
+        except InputError as error:
+            self.refuse("model", error)
+            return
+        self.counters["models"] += 1
 
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report."""

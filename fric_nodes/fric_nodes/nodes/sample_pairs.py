@@ -32,13 +32,20 @@ class EffortPairing:
 
     Args:
         hold: what the effort of a joint state means: ``"preceding"``, ``"following"`` or ``"linear"``.
+        at_stamp: give the effort at the stamp; False: as it was sent, with a meaning that :attr:`hold` tells.
     """
 
-    def __init__(self, hold: str) -> None:
+    def __init__(self, hold: str, at_stamp: bool = True) -> None:
         self._hold = hold
+        self._at_stamps = at_stamp
         self.lacks_effort = False
         """True since a sample came without effort."""
         self.clear()
+
+    @property
+    def hold(self) -> str:
+        """What the effort of a sample means that is given as it was sent; a command acts from the sample on."""
+        return "following" if self.lacks_effort else self._hold
 
     def clear(self) -> None:
         """Forget samples and commands."""
@@ -90,7 +97,7 @@ class EffortPairing:
 
     def _at_stamp(self, sample: Sample, hold: str) -> Sample | None:
         """The newest sample whose effort at its stamp is known now."""
-        if hold == "linear":
+        if hold == "linear" or not self._at_stamps:
             return sample
         last = self._last
         if last is None or sample.time < last.time:

@@ -8,13 +8,17 @@ Forgetting is directional (Cao and Schwartz 2000): with information matrix R and
 
     R <- R - n (1 - lambda) R phi phi' R / (phi' R phi) + phi phi',
 
-so that old information fades only along directions in which new information comes in. A row takes one of n directions, so it
-forgets n-fold there, and the whole fades by lambda per row on average. A parameter that the motion does not
-excite keeps its value and its standard error, however long the axis rests or repeats itself: no wind-up, no drift.
+so that old information fades only along directions in which new information comes in. A row takes one of n directions, so
+it forgets n-fold there, and the whole fades by lambda per row on average. A parameter that the motion does not excite keeps
+its value and its standard error, however long the axis rests or repeats itself: no wind-up, no drift.
 
 The covariance is the sandwich R^-1 S R^-1, with S the forgetting sum of score products over blocks of time: correlated
 residuals, which every real axis has, widen the intervals as they should. While there are too few blocks for that, the
 white-noise formula widened by the residuals' first autocorrelation stands in.
+
+A step change of friction shows as residuals of which other values of the parameters would explain nine times as much as
+they usually would, in two blocks running. All but a moment's worth of the old information then goes, values stay, and what
+comes in counts at once.
 """
 
 from __future__ import annotations
@@ -22,19 +26,19 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 
-from ..model import Model
-from ..record import Array, Mask, Record, RecordError
-from .equations import Equations, at_rest, equations
-from .free_parameters import FreeParameters
-from .inverse_dynamics import regressors
-from .result import IdentificationError, Options
-from .scoring import driving_force
+from ...model import Model
+from ...record import Array, Mask, Record, RecordError
+from ..equations import Equations, at_rest, equations
+from ..free_parameters import FreeParameters
+from ..inverse_dynamics import regressors
+from ..result import IdentificationError, Options
+from ..scoring import driving_force
+from .estimate import Estimate, State, model_with, status_of
 
-__all__ = ["Estimate", "OnlineIdentifier", "State"]
+__all__ = ["OnlineIdentifier"]
 
 _BLOCK_TIME = 0.5  # [s]
 _MIN_BLOCKS_PER_PARAMETER = 3
@@ -42,43 +46,12 @@ _MOST_FORGOTTEN = 0.9  # of the information along one row, by that row
 _REST = 0.02  # of the fastest motion, as offline
 _GROWN = 1.02  # growth of the rest limit from which the blocks kept are judged anew
 _BLOCKS_KEPT = 240
-
-
-class State(IntEnum):
-    """What the identifier is doing; numbers as in ``fric_interfaces/FrictionEstimate``."""
-
-    IDLE = 0
-    RUNNING = 1
-    FROZEN = 2
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """The estimate so far; arrays of shape ``(n_parameters,)``.
-
-    Attributes:
-        names: of the parameters estimated.
-        values: in SI.
-        standard_errors: NaN while nothing is known.
-        covariance: shape ``(n_parameters, n_parameters)``.
-        excited: True where the data determine the parameter to better than 20 %.
-        residual_rms: of the force equation [F].
-        samples_used: samples that went into the estimate.
-        samples_rejected: samples that were refused (not finite, stamps not increasing).
-        state: what the identifier is doing.
-        status: the same in words, with what to do next.
-    """
-
-    names: tuple[str, ...]
-    values: Array
-    standard_errors: Array
-    covariance: Array
-    excited: Mask
-    residual_rms: float
-    samples_used: int
-    samples_rejected: int
-    state: State
-    status: str
+_CHANGED = 9.0  # what other values would explain of a block's residuals, beside what they usually would
+_USUAL = 0.1  # share of a block in what is usual
+_TOLD = 1e-3  # of a regressor's length, beside the others
+_CHANGED_BLOCKS = 2
+_OLD = 0.05  # of a block: what old information counts after a change
+_ROWS_PER_PARAMETER = 20  # behind what is called usual
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +74,10 @@ class OnlineIdentifier:
         forgetting_time: how long information counts, in time of informative motion [s]; infinite: for ever.
         options: filter settings, as offline.
     """
+
+    averages_force = True
+    hold = "linear"
+    title = "recursive least squares"
 
     def __init__(self, structure: Model, forgetting_time: float = 60.0, options: Options | None = None) -> None:
         self.options = Options() if options is None else options
@@ -128,6 +105,8 @@ class OnlineIdentifier:
         self._n_blocks = 0.0
         self._energy = self._lagged_energy = self._weight = 0.0
         self._last_residual = 0.0
+        self._n_changed = 0
+        self._explained = 0.0
         self.samples_used = 0
 
     def _clear_buffer(self) -> None:
@@ -212,9 +191,7 @@ class OnlineIdentifier:
         held[self._free.index] = 0.0
         row_time = float(found.time[1] - found.time[0])
         force = driving_force(self.structure, found)
-        block = _Block(
-            columns[:, self._free.index], force - columns @ held, found.velocity, found.sliding, row_time, sample_time
-        )
+        block = _Block(columns[:, self._free.index], force - columns @ held, found.velocity, found.clear, row_time, sample_time)
         self._blocks.append(block)
         rest = self._rest_limit()
         if rest > _GROWN * self._rest:
@@ -240,6 +217,7 @@ class OnlineIdentifier:
         score = np.zeros(block.rows.shape[1])
         n_learnt = 0
         sliding = block.sliding & ~at_rest(block.velocity, rest, block.row_time)
+        self._look_for_change(block.rows[sliding], block.target[sliding])
         for phi, force in zip(block.rows[sliding], block.target[sliding], strict=True):
             if float(phi @ phi) > 0.0:
                 score += phi * self._update(phi, float(force), forgetting)
@@ -250,6 +228,30 @@ class OnlineIdentifier:
             self._scores = fade * self._scores + np.outer(score, score)
             self._n_blocks = fade * self._n_blocks + 1.0
         return n_learnt > 0
+
+    def _look_for_change(self, rows: Array, target: Array) -> None:
+        """Let the old go when the residuals of these rows, before they are learnt from, say that the axis has changed."""
+        n = self._values.shape[0]
+        if rows.shape[0] < n or self._weight < _ROWS_PER_PARAMETER * n or self._energy <= 0.0:
+            return
+        residual = target - rows @ self._values
+        basis, triangle = np.linalg.qr(rows / np.maximum(np.linalg.norm(rows, axis=0), 1e-300))
+        told = np.abs(np.diag(triangle)) > _TOLD
+        explained = float(np.mean((basis.T @ residual)[told] ** 2)) if np.any(told) else 0.0
+        white = self._energy / (self._weight - n)
+        usual = max(self._explained, white)
+        self._n_changed = self._n_changed + 1 if explained > _CHANGED * usual else 0
+        self._explained += _USUAL * (min(explained, _CHANGED * usual) - self._explained)
+        if self._n_changed < _CHANGED_BLOCKS:
+            return
+        self._n_changed = 0
+        left = _OLD * rows.shape[0] / self._weight
+        self._information *= left
+        self._scores *= left
+        self._n_blocks *= left
+        self._energy *= left
+        self._lagged_energy *= left
+        self._weight *= left
 
     def _update(self, phi: Array, force: float, forgetting: float) -> float:
         """One row into the estimate; the residual before it [F]."""
@@ -308,15 +310,7 @@ class OnlineIdentifier:
         values = np.clip(self._values, self._free.lower, self._free.upper)
         with np.errstate(invalid="ignore"):
             excited = known & (errors < 0.2 * np.abs(values))
-        if self.state is State.FROZEN:
-            status = "frozen: unfreeze to go on learning"
-        elif not self.samples_used:
-            status = "waiting for motion"
-        elif np.all(excited):
-            status = "every parameter is determined"
-        else:
-            missing = [name for name, good in zip(self._free.names, excited, strict=True) if not good]
-            status = f"not determined yet: {', '.join(missing)}; move at more speeds and accelerations, in both directions"
+        status = status_of(self.state, self.samples_used, self._free.names, np.asarray(excited, dtype=np.bool_))
         rms = math.sqrt(self._energy / self._weight) if self._weight > 0 else math.nan
         return Estimate(
             self._free.names,
@@ -333,10 +327,4 @@ class OnlineIdentifier:
 
     def model(self) -> Model:
         """The structure with the values estimated so far and their standard errors; slip dynamics as they were given."""
-        found = self.estimate()
-        by_name = dict(zip(found.names, found.values.tolist(), strict=True))
-        errors = {
-            name: error for name, error in zip(found.names, found.standard_errors.tolist(), strict=True) if math.isfinite(error)
-        }
-        values = np.array([by_name.get(p.name, p.value) for p in self._whole.parameters()])
-        return self._whole.with_values(values, errors)
+        return model_with(self._whole, self.estimate())
