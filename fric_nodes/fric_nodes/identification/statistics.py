@@ -32,6 +32,7 @@ __all__ = [
     "resolution_of",
     "sandwich",
     "sandwich_covariance",
+    "window_loss",
 ]
 
 _DIFFERENCES = 6  # of a signal, which leave its white noise and hardly any of its motion
@@ -87,7 +88,7 @@ def sandwich(information: Array, score: Array, lag: int, starts: Index) -> Array
     bread = np.linalg.pinv(information / np.outer(size, size), rcond=1e-12, hermitian=True)
     # The degrees of freedom that the fit has used up.
     n = int(np.sum(np.any(score != 0.0, axis=1)))
-    meat = long_run(score / size, lag, starts) * n / max(n - n_parameters, 1) * _window_loss(lag, n)
+    meat = long_run(score / size, lag, starts) * n / max(n - n_parameters, 1) * window_loss(lag, n)
     return np.asarray(bread @ meat @ bread / np.outer(size, size), dtype=np.float64)
 
 
@@ -149,7 +150,7 @@ def definite(corrected: Array, plain: Array) -> Array:
     return np.asarray(root @ inner @ root.T, dtype=np.float64)
 
 
-def _window_loss(lag: int, n: int) -> float:
+def window_loss(lag: int, n: int) -> float:
     """By how much the variance is to be widened for what the weights cut off and for its own uncertainty.
 
     With a window that is a share b of the series, 90 % of the estimates lie within 1.645 + 2.186 b + 0.314 b^2 - 0.343 b^3

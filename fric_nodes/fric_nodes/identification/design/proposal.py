@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from io import StringIO
 from typing import Any
 
 import numpy as np
-import yaml
+from ruamel.yaml import YAML
 
 from ...control.pid import PidGains
 from ...excitation import EXCITATIONS
@@ -77,7 +78,9 @@ class Proposal:
             **kinds,
         }
         head = f"# Proposed by fric identify --design. Ends after {self.trial.motion.time[-1]:.1f} s.\n"
-        return head + yaml.safe_dump({"/**": {"ros__parameters": settings}}, sort_keys=False)
+        text = StringIO()
+        YAML().dump({"/**": {"ros__parameters": settings}}, text)
+        return head + text.getvalue()
 
     def summary(self) -> dict[str, Any]:
         """What ``design.json`` holds."""
