@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.universe import universe_of
-from fric_nodes.effects import EFFECTS
+from fric_nodes.diagnosis.universe import common_effects, universe_of
+from fric_nodes.effect import Effect
 from fric_nodes.model import Model, Term, build_model, term
 from fric_nodes.record import Array
 from fric_nodes.simulate import Simulator, simulate
 
 H = 1e-3
-ABLE = [effect for effect in EFFECTS.values() if effect.neutral is not None]
+ABLE = common_effects()
 
 
 def force() -> Array:
@@ -23,16 +23,29 @@ def base() -> Model:
     return build_model("rigid", {"mass": 2.0}, [term("coulomb", force=5.0), term("viscous", coefficient=20.0)])
 
 
+def run(values: Array) -> Array:
+    """Positions of the base model's universe with these values."""
+    universe = universe_of(base())
+    effort = force()
+    states = np.ascontiguousarray(universe.plant.start(values[:1], 0.0, 0.0))
+    found, friction, applied = np.empty((effort.shape[0], 2)), np.empty(effort.shape[0]), np.empty(effort.shape[0])
+    universe.loops.simulate(
+        values, effort, H, 4, 0.0, np.ones(1), np.zeros(1), states, *universe.inner_states(base()), found, friction, applied
+    )
+    return found[:, 0]
+
+
 @pytest.mark.parametrize("effect", ABLE, ids=[effect.key for effect in ABLE])
-def test_neutral_values_leave_the_motion_as_it_was(effect) -> None:  # type: ignore[no-untyped-def]
-    model = base()
+def test_neutral_values_leave_the_motion_as_it_was(effect: Effect) -> None:
+    universe = universe_of(base())
+    values = universe.values(base())
+    expected = run(values)
     assert effect.neutral is not None
-    kept = [held for held in model.terms if held.effect.id != effect.id]
-    plain = model.with_terms(kept)
-    beside = model.with_terms((*kept, Term(effect, effect.neutral)))
-    expected = simulate(plain, force(), H, n_substeps=4)
-    found = simulate(beside, force(), H, n_substeps=4)
-    assert np.max(np.abs(found.position - expected.position)) <= 1e-9 * np.ptp(expected.position)
+    universe.put(values, Term(effect, effect.neutral))
+    if effect.id in {"coulomb", "viscous"}:
+        assert np.max(np.abs(run(values) - expected)) > 1e-3  # there it takes the base model's own friction away
+        return
+    assert np.max(np.abs(run(values) - expected)) <= 1e-9 * np.ptp(expected)
 
 
 def test_an_effect_with_an_amplitude_is_not_always_neutral() -> None:
