@@ -31,7 +31,7 @@ def test_nothing_is_found_where_nothing_is_missing() -> None:
     assert found.validation.noe_refit == pytest.approx(found.validation.noise_floor, rel=0.3)
 
 
-@pytest.mark.parametrize("effect", ["position_dependence", "asymmetry", "accel_hysteresis"])
+@pytest.mark.parametrize("effect", ["asymmetry", "accel_hysteresis"])
 def test_a_concealed_effect_is_named(effect: str) -> None:
     case = draw(2, "moderate", effect)
     found = diagnose(case.train, case.validation, case.nominal)
