@@ -15,7 +15,7 @@ from fric_nodes.verification import VERIFICATIONS
 from fric_nodes.verification.verification import Evidence, Verification
 
 
-# The concealed cases are whole diagnoses, a minute each: `fric verify concealed-...` runs them.
+# The concealed cases are whole diagnoses, a minute each: `fric verify concealed_...` runs them.
 @pytest.mark.parametrize("name", [name for name in VERIFICATIONS if not name.startswith("concealed")])
 def test_it_reaches_its_goals(name: str) -> None:
     check = VERIFICATIONS[name]
