@@ -173,7 +173,7 @@ class Effect:
         """The parameters that say how strong the effect is; none when no value of a parameter makes it vanish."""
         if self.slip is not None or self.link is not None or self.play is not None:
             return ()
-        return tuple(p.name for p in self.parameters if p.linear or p.name in self.absent)
+        return tuple(p.name for p in self.parameters if (p.linear and not p.shape) or p.name in self.absent)
 
     @property
     def neutral(self) -> tuple[float, ...] | None:

@@ -13,6 +13,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -71,6 +72,7 @@ class Scales:
         return max(self.high - self.low, 1e-12)
 
 
+@lru_cache(maxsize=8)
 def scales_of(track: Track) -> Scales:
     """The scales of a track."""
     runs = track.runs
@@ -203,9 +205,9 @@ def _of_dimension(effect: Effect, parameter: Parameter, scales: Scales) -> Array
     if dimension == "x/s":
         return np.geomspace(max(3.0 * scales.slow, 3e-3 * scales.speed), 0.5 * scales.speed, 6)
     if dimension == "s":
-        return np.geomspace(5.0 * scales.step, 0.5 * scales.duration, 5)
+        return np.geomspace(5.0 * scales.step, 0.5 * scales.duration, 10)
     if dimension == "1/s":
-        return np.geomspace(1.0, scales.fastest, 16)
+        return np.geomspace(2.5, scales.fastest, 14)
     if dimension == "F/x":
         if effect.slip is not None:
             return np.asarray(scales.level / np.geomspace(max(scales.grain, 1e-5 * scales.travel), 0.03 * scales.travel, 7))

@@ -348,7 +348,7 @@ def _where(
     energy = []
     for run, begun in zip(track.runs, track.time, strict=True):
         values = np.interp(begun + float(real.time[index[0]]), real.time[index], off)
-        energy.append(np.maximum(steady(values**2, float(np.median(run.step))) - 2.0 * noise**2, 0.0))
+        energy.append(np.maximum(steady(values**2, run.sample_time) - 2.0 * noise**2, 0.0))
     where = locate(track, energy, scales_of(track), model)
     begin = float(real.time[index[0]])
     spans = tuple(tuple((round(a + begin, 4), round(b + begin, 4)) for a, b in each) for each in where.time)

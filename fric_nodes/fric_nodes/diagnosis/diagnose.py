@@ -25,9 +25,10 @@ from ..instrument import inspect
 from ..model import Model
 from ..record import Array, Record
 from .candidates import Scales, candidates, place_of, scales_of
+from .component import Signature, signatures
 from .confidence import confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
-from .grow import Growth, Step, best_track, grow
+from .grow import Growth, Step, best_track, grow, refit
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
 from .screen import Tried
@@ -39,8 +40,11 @@ __all__ = ["DiagnosisError", "diagnose", "refit_noe"]
 _BANDWIDTHS = (45.0, 140.0, 400.0)  # [rad/s]
 _FAST = 1.0  # largest product of bandwidth and sample time
 _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
+_CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
 _UNEXPLAINED = 0.2  # of what was missing: with more left, something unknown remains
 _HARDLY = 0.6  # with more than this left, what was found is no explanation and is not named
+_FIRST_FIT = 6  # iterations, by which starts are compared
+_STANDS_OUT = 10.0  # times the floor
 _LOCATING = 300.0  # [rad/s], for spans of time
 
 
@@ -70,16 +74,16 @@ def diagnose(
     conditions = nominal_conditions(train) | dict(nominal.nominal)
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
-    start = _started(nominal, train)
-    tracks = _tracks(train, start)
+    tracks, start = _started(nominal, train)
     parts = excerpt(tracks, start)
     growth = grow(tracks if parts is None else parts.tracks, start, tell)
+    searched = list(tracks if parts is None else parts.tracks)
     if parts is not None:
         tell("fitting what was found to all samples")
         growth, note = confirmed(parts, growth)
         corrected.append(note)
     tell("judging on the validation recordings")
-    return _concluded(train, validation, nominal, checks, corrected, growth)
+    return _concluded(train, validation, nominal, checks, corrected, searched, growth)
 
 
 def refit_noe(model: Model, train: Sequence[Record], validation: Sequence[Record], bandwidth: float) -> float:
@@ -136,13 +140,18 @@ def _corrected(
     return held, kept_apart, notes
 
 
-def _started(nominal: Model, train: Sequence[Record]) -> Model:
-    """The nominal structure with values that a fit can start from."""
+def _started(nominal: Model, train: Sequence[Record]) -> tuple[list[Track], Model]:
+    """The recordings, followed, and the nominal structure with values that a fit can start from: the given or better ones."""
+    starts = [replace(nominal, standard_errors={})]
     try:
-        found = METHODS["inverse-dynamics"].fit(replace(nominal, standard_errors={}), list(train), Options()).model
+        found = METHODS["inverse-dynamics"].fit(starts[0], list(train), Options()).model
+        if np.all(np.isfinite(found.values)):
+            starts.insert(0, found)
     except (IdentificationError, np.linalg.LinAlgError):
-        return nominal
-    return found if np.all(np.isfinite(found.values)) else nominal
+        pass
+    tracks = _tracks(train, starts[0])
+    fits = [refit(tracks[0], start, max_iterations=_FIRST_FIT) for start in starts]
+    return tracks, min(fits, key=lambda state: float(state.fit.residual @ state.fit.residual)).fit.model
 
 
 def _tracks(train: Sequence[Record], start: Model) -> list[Track]:
@@ -161,6 +170,7 @@ def _concluded(
     nominal: Model,
     checks: Sequence[Check],
     corrected: Sequence[str],
+    tracks: Sequence[Track],
     growth: Growth,
 ) -> Diagnosis:
     track = growth.track
@@ -168,21 +178,28 @@ def _concluded(
     held = _shown(validation, track, begin)
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
     spread = _spread(held)
-    floor = [held.residual(end, twin.efforts, twin.positions) for twin in twins(held, end, 3)]
+    floor = [held.residual(end, twin) for twin in twins(held, end, 3)]
     noe = {name: 100.0 * float(each @ each) / spread for name, each in left.items()}
     noise_floor = 100.0 * float(np.mean([each @ each for each in floor])) / spread
     scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
     missing = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
+    # What the recordings held back don't show has been chance, or has been over before they were made.
+    missing = missing and noe["refit"] > (1.0 + _CONFIRMED) * noise_floor
+    if not missing or noe["augmented"] > noe["refit"]:
+        growth = replace(growth, end=growth.begin, steps=(), rejected=(*growth.rejected, *_withdrawn(growth, missing)))
+        end, left["augmented"] = begin, left["refit"]
+        scored = replace(scored, noe_augmented=noe["refit"])
     scales = scales_of(held)
     findings = [_finding(validation, held, growth, end, step, scored, scales) for step in growth.steps]
-    rest = growth.rest if missing else 0.0
+    seen_rest = max(scored.noe_augmented - noise_floor, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
+    rest = min(max(growth.rest, seen_rest), 1.0) if missing else 0.0
     unknown = missing and (rest > _UNEXPLAINED or not findings)
     unexplained = Unexplained(rest, None)
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
         where = _where_left(held, left["augmented"], floor, scales, end)
         unexplained = Unexplained(rest, where)
         if unknown:
-            findings = [_unknown(where, growth, scored, rest), *([] if rest > _HARDLY else findings)]
+            findings = [_unknown(where, tracks, growth, scored, rest), *([] if rest > _HARDLY else findings)]
     return Diagnosis(
         mismatch=missing,
         checks=tuple(checks),
@@ -202,6 +219,12 @@ def _concluded(
     )
 
 
+def _withdrawn(growth: Growth, missing: bool) -> list[tuple[str, str]]:
+    """Terms that the recordings held back speak against, with the reason."""
+    why = "makes the recordings held back worse" if missing else "the recordings held back show no mismatch"
+    return [(step.term.split("#")[0], why) for step in growth.steps]
+
+
 def _shown(validation: Sequence[Record], track: Track, begin: Model) -> Track:
     """The validation recordings, followed as fast as what is missing still stands out from the floor."""
     step = max(record.sample_time for record in validation)
@@ -210,7 +233,7 @@ def _shown(validation: Sequence[Record], track: Track, begin: Model) -> Track:
         if not held.runs:
             raise DiagnosisError(validation[0].source, "has no valid part of 200 samples", "record for longer")
         left = held.residual(begin)
-        floor = [held.residual(begin, twin.efforts, twin.positions) for twin in twins(held, begin, 2)]
+        floor = [held.residual(begin, twin) for twin in twins(held, begin, 2)]
         if bandwidth <= track.bandwidth or float(left @ left) > 3.0 * float(np.mean([each @ each for each in floor])):
             break
     return held
@@ -242,7 +265,7 @@ def _finding(
     change = fast.padded(fast.residual(shown)), fast.padded(fast.residual(end))
     energy = []
     for run, before, after in zip(fast.runs, *change, strict=True):
-        h = float(np.median(run.step))
+        h = run.sample_time
         energy.append(steady(moved_back(before - after, h, fast.bandwidth) ** 2, h))
     where = locate(fast, energy, scales, end)
     excess = max(step.missing, 1e-300)
@@ -285,15 +308,16 @@ def _where_left(held: Track, residual: Array, floor: Sequence[Array], scales: Sc
     level = float(np.mean([each @ each for each in floor])) / residual.shape[0]
     energy = []
     for run, part in zip(held.runs, held.padded(residual), strict=True):
-        h = float(np.median(run.step))
+        h = run.sample_time
         energy.append(np.maximum(steady(moved_back(part, h, held.bandwidth) ** 2, h) - 2.0 * level, 0.0))
     return locate(held, energy, scales, model)
 
 
-def _unknown(where: Where, growth: Growth, scored: Validation, rest: float) -> Finding:
+def _unknown(where: Where, tracks: Sequence[Track], growth: Growth, scored: Validation, rest: float) -> Finding:
     tried = sorted((s for s in growth.last), key=lambda each: each.left)
     best = tried[0].column.term.effect if tried else None
     beside = f"; the best of them, {best.title}, doesn't explain it" if best is not None else ""
+    likely = _signature_of(tracks, growth)
     return Finding(
         effect="unknown",
         law="",
@@ -301,19 +325,29 @@ def _unknown(where: Where, growth: Growth, scored: Validation, rest: float) -> F
         confidence=unknown_confidence(growth, rest),
         runner_up=RunnerUp(best.id, round(1.0 - unknown_confidence(growth, rest), 4)) if best is not None else None,
         where=where,
-        component=_component_of(growth),
+        component=likely.component,
         share=rest,
-        evidence=f"{100 * rest:.3g} % of the missing force's energy is left by every combination of known effects{beside}",
+        evidence=f"{100 * rest:.3g} % of the missing force's energy is left by every combination of known effects{beside}; "
+        f"it looks most like {likely.title}, which would take {100 * likely.share:.3g} % of it",
         parameters={},
         noe_before=scored.noe_refit,
         noe_after=scored.noe_augmented,
     )
 
 
-def _component_of(growth: Growth) -> str:
-    """The component whose effects come closest to the rest."""
-    tried = sorted(growth.last, key=lambda each: each.left)
-    return place_of(tried[0].column.term.effect) if tried else "not known"
+def _signature_of(tracks: Sequence[Track], growth: Growth) -> Signature:
+    """What is missing looks like, to the slowest observer to which it stands out: a slow one blurs how a contact sticks.
+
+    Where one signature explains more than all the effects that were grown, these have only stood in for it.
+    """
+    for track in sorted(tracks, key=lambda each: each.bandwidth):
+        state = refit(track, growth.begin.fit.model, max_iterations=_FIRST_FIT)
+        if state.excess > _STANDS_OUT * state.floor or track.bandwidth >= growth.track.bandwidth:
+            break
+    whole = signatures(track, state.fit, () if growth.steps else growth.last)[0]
+    if not growth.steps or whole.share > 1.0 - growth.rest:
+        return whole
+    return signatures(track, refit(track, growth.end.fit.model, max_iterations=_FIRST_FIT).fit, growth.last)[0]
 
 
 def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, ...]:

@@ -71,7 +71,7 @@ def _spans(track: Track, energy: Sequence[Array]) -> tuple[tuple[tuple[tuple[flo
     """Spans of time of each record that hold most of the energy, and the share that they hold."""
     cells: list[tuple[int, float, float]] = []  # record, start of the cell, energy
     for k, run in enumerate(track.runs):
-        step = float(np.median(run.step))
+        step = run.sample_time
         many = max(round(_CELL / step), 1)
         n = energy[k].shape[0] // many
         sums = np.sum(energy[k][: n * many].reshape(n, many), axis=1)
@@ -100,7 +100,7 @@ def _spans(track: Track, energy: Sequence[Array]) -> tuple[tuple[tuple[tuple[flo
 
 def _velocity(track: Track, k: int) -> Array:
     run = track.runs[k]
-    step = float(np.median(run.step))
+    step = run.sample_time
     return np.gradient(smooth(run.position, step, 2.0 * track.bandwidth), step)
 
 
@@ -109,7 +109,7 @@ def _regimes(track: Track, energy: Sequence[Array], scales: Scales) -> list[tupl
     signals: dict[str, list[Array]] = {}
     for k, run in enumerate(track.runs):
         velocity = _velocity(track, k)
-        since_time, since_distance = _since_reversal(run.position, velocity, scales, float(np.median(run.step)))
+        since_time, since_distance = _since_reversal(run.position, velocity, scales, run.sample_time)
         here = {
             "speed": np.abs(velocity),
             "time since reversal": since_time,

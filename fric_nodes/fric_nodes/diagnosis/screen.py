@@ -7,7 +7,7 @@ its score: the sum over blocks of the squares that remain. Only sums of products
 block), so that every candidate, and every pair of them, costs a few small systems of equations.
 
 Grids of many values (the period of a ripple, the place of a bump, the age of a contact) are narrowed beforehand by columns that
-need no observer: the force that the term adds along the measured motion, through the observer's own filter.
+need no observer: the force that the term adds along the measured motion (:mod:`fric_nodes.diagnosis.along`).
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Model, Term
+from ..model import Term
 from ..record import Array
+from .along import Along
 from .candidates import Candidate
 from .track import Fit, Track
-from .twin import smooth
-from .universe import universe_of
 
-__all__ = ["Column", "Gram", "Screening", "Tried", "blocks_of", "columns_of", "motions", "narrowed", "screen"]
+__all__ = ["Column", "Gram", "Promise", "Screening", "Tried", "blocks_of", "columns_of", "restraint", "screen"]
 
 _BLOCKS = 10
 _KEPT = 2  # trials of a candidate that go from the quick columns to the observer's
 _TINY = 1e-10
+_OWN = 0.02  # of a column, what the fit's own parameters must not be able to do
 _PAIRS = 5
 
 
@@ -76,9 +76,11 @@ class Gram:
     Args:
         columns: shape ``(n, n_columns)``.
         blocks: first row of each block, ascending, the first 0.
+        held: for each column, by what square its coefficient is held back, ``(n_columns,)``; 0: not at all.
     """
 
-    def __init__(self, columns: Array, blocks: Array) -> None:
+    def __init__(self, columns: Array, blocks: Array, held: Array | None = None) -> None:
+        self._held = np.zeros(columns.shape[1]) if held is None else held
         parts = np.split(columns, blocks[1:])
         self.of_block = np.array([part.T @ part for part in parts])
         self.total = np.sum(self.of_block, axis=0)
@@ -91,7 +93,7 @@ class Gram:
         scale = np.sqrt(np.maximum(np.diag(self.total)[index], 1e-300))
         inside = self.total[np.ix_(index, index)] - self.of_block[:, index[:, None], index[None, :]]
         load = self.total[index, target] - self.of_block[:, index, target]
-        normal = inside / np.outer(scale, scale) + _TINY * np.eye(index.size)
+        normal = inside / np.outer(scale, scale) + np.diag(_TINY + self._held[index] / scale**2)
         weight = -np.linalg.solve(normal, (load / scale)[..., None])[..., 0] / scale
         held = self.of_block
         linear = np.einsum("bi,bi->b", weight, held[:, index, target])
@@ -102,7 +104,7 @@ class Gram:
         """Coefficients of the columns ``used`` that leave the least of ``target`` over all blocks."""
         index = np.array(used, dtype=np.int64)
         scale = np.sqrt(np.maximum(np.diag(self.total)[index], 1e-300))
-        normal = self.total[np.ix_(index, index)] / np.outer(scale, scale) + _TINY * np.eye(index.size)
+        normal = self.total[np.ix_(index, index)] / np.outer(scale, scale) + np.diag(_TINY + self._held[index] / scale**2)
         return np.asarray(-np.linalg.solve(normal, self.total[index, target] / scale) / scale)
 
 
@@ -111,52 +113,53 @@ def blocks_of(track: Track, n: int) -> Array:
     return np.unique(np.linspace(0, n, _BLOCKS + 1).astype(np.int64)[:-1])
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """The measured motion of one run, smoothed: position [x], velocity [x/s] and acceleration [x/s^2], and its step [s]."""
+def restraint(track: Track, fit: Fit) -> float:
+    """By what square a coefficient of the fit's Jacobian is held back [F^2]: as if it were known beforehand to its own size.
 
-    position: Array
-    velocity: Array
-    acceleration: Array
-    step: float
-
-
-def motions(track: Track) -> list[Motion]:
-    """The smoothed motion of each run, once for all candidates: filtering it costs more than to predict a force along it."""
-    found = []
-    for run in track.runs:
-        step = float(np.median(run.step))
-        position = smooth(run.position, step, 4.0 * track.bandwidth)
-        velocity = np.gradient(position, step)
-        found.append(Motion(position, velocity, np.gradient(velocity, step), step))
-    return found
+    It changes nothing where the recording tells a parameter, and keeps one that a block alone tells from running away without
+    that block, to where no first order holds. A low-passed residual holds about duration times bandwidth over two numbers.
+    """
+    duration = float(sum(np.sum(run.step) for run in track.runs))
+    return float(fit.residual @ fit.residual) / max(0.5 * track.bandwidth * duration, 10.0)
 
 
-def narrowed(track: Track, fit: Fit, candidate: Candidate, motion: Sequence[Motion]) -> list[Term]:
-    """The trials of ``candidate`` that promise most by the force they add along the measured ``motion``."""
-    effect = candidate.effect
-    if len(candidate.trials) <= _KEPT or effect.neutral is None or effect.command is not None:
-        return list(candidate.trials)
-    base = _along(track, fit.model, None, motion)
-    basis, _ = np.linalg.qr(fit.jacobian / np.maximum(np.linalg.norm(fit.jacobian, axis=0), 1e-300))
-    missing = fit.residual - basis @ (basis.T @ fit.residual)
-    promise = []
-    for trial in candidate.trials:
-        columns = np.array(
-            [
-                track.seen([a - b for a, b in zip(_along(track, fit.model, part, motion), base, strict=True)])
-                for part in _parts(trial)
-            ]
-        ).T
-        columns = columns - basis @ (basis.T @ columns)
+class Promise:
+    """Which trials of a candidate promise most, by the force that they add along the measured motion.
+
+    Args:
+        along: the motion.
+        fit: of the model that lacks something.
+    """
+
+    def __init__(self, along: Along, fit: Fit) -> None:
+        self._along = along
+        self._model = fit.model
+        self._able = along.can(fit.model)
+        if self._able:
+            self._base = along.residual(fit.model)
+            columns = along.changes(fit.model, fit.names, fit.scale)
+            self._basis, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+            self._missing = self._base - self._basis @ (self._basis.T @ self._base)
+
+    def narrowed(self, candidate: Candidate) -> list[Term]:
+        """The trials of ``candidate`` that promise most."""
+        effect = candidate.effect
+        if not self._able or len(candidate.trials) <= _KEPT or effect.neutral is None or effect.command is not None:
+            return list(candidate.trials)
+        promise = [self._of(trial) for trial in candidate.trials]
+        order = np.argsort(promise)[::-1][:_KEPT]
+        return [candidate.trials[k] for k in order if promise[k] > 0.0]
+
+    def _of(self, trial: Term) -> float:
+        """What the trial takes off the sum of squares along the motion [F^2]."""
+        columns = np.stack([self._along.residual(self._model, part) - self._base for part in _parts(trial)], axis=1)
+        whole = np.linalg.norm(columns, axis=0)
+        columns = columns - self._basis @ (self._basis.T @ columns)
         size = np.linalg.norm(columns, axis=0)
-        if not np.all(np.isfinite(size)) or np.max(size) == 0.0:
-            promise.append(0.0)
-            continue
+        if not np.all(np.isfinite(size)) or np.max(size) <= _OWN * np.max(whole):
+            return 0.0  # the fit's own parameters do the same
         own, _ = np.linalg.qr(columns / np.maximum(size, 1e-300))
-        promise.append(float(np.sum((own.T @ missing) ** 2)))
-    order = np.argsort(promise)[::-1][:_KEPT]
-    return [candidate.trials[k] for k in order if promise[k] > 0.0]
+        return float(np.sum((own.T @ self._missing) ** 2))
 
 
 def _parts(trial: Term) -> list[Term]:
@@ -179,23 +182,6 @@ def _scales(name: str, trial: Term) -> bool:
     """True when the force grows in proportion to the amplitude ``name``, at least while it is small."""
     parameter = next(p for p in trial.effect.parameters if p.name == name)
     return parameter.linear or parameter.dimension not in ("F", "s")
-
-
-def _along(track: Track, model: Model, extra: Term | None, motion: Sequence[Motion]) -> list[Array]:
-    """The force that ``model``, with ``extra``, needs along the measured motion [F], per run."""
-    universe = universe_of(model)
-    values = universe.values(model)
-    if extra is not None:
-        universe.put(values, extra)
-    found = []
-    for run, time, each in zip(track.runs, track.time, motion, strict=True):
-        effort, friction = np.empty_like(time), np.empty_like(time)
-        universe.loops.predict(
-            values, time, each.position, each.velocity, each.acceleration, each.step, run.load, run.temperature,
-            *universe.inner_states(model), effort, friction,
-        )  # fmt: skip
-        found.append(effort)
-    return found
 
 
 def columns_of(track: Track, fit: Fit, trials: Sequence[Term]) -> list[Column]:
@@ -231,18 +217,20 @@ class Screening:
     Attributes:
         alone: sum of squares that the refit leaves on unseen blocks [F^2].
         tried: the best trial of each effect, the best effect first.
+        laws: of effects with several laws, the best trial of another law than the one in ``tried``.
         pairs: the best pairs of different effects with what they leave together, the best first.
     """
 
     alone: float
     tried: tuple[Tried, ...]
+    laws: tuple[Tried, ...]
     pairs: tuple[tuple[Tried, Tried, float], ...]
 
 
 def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: Sequence[Array]) -> Screening:
     """Every candidate at first order, alone and in pairs, on blocks that it has not seen."""
-    motion = motions(track)
-    trials = [trial for candidate in found for trial in narrowed(track, fit, candidate, motion)]
+    promise = Promise(Along(track), fit)
+    trials = [trial for candidate in found for trial in promise.narrowed(candidate)]
     columns = columns_of(track, fit, trials)
     n_free = len(fit.names)
     stacked = [fit.residual[:, None], *(each[:, None] for each in twin_residuals), fit.jacobian]
@@ -258,7 +246,9 @@ def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: S
             stacked.append((fit.residual + column.parts[0])[:, None])
             first += 1
     everything = np.concatenate(stacked, axis=1)
-    gram = Gram(everything, blocks_of(track, everything.shape[0]))
+    held = np.zeros(everything.shape[1])
+    held[1 + len(twin_residuals) : 1 + len(twin_residuals) + n_free] = restraint(track, fit)
+    gram = Gram(everything, blocks_of(track, everything.shape[0]), held)
     refit = list(range(1 + len(twin_residuals), 1 + len(twin_residuals) + n_free))
     alone = gram.left(0, refit)
     chance_alone = [gram.left(1 + k, refit) for k in range(len(twin_residuals))]
@@ -276,12 +266,14 @@ def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: S
         # A structure can't be there by a part: its values are judged by what it leaves as it is.
         promise[id(column)] = gram.left(whole, refit) if whole else left
     best: dict[str, Tried] = {}
-    for tried, _ in able:
+    laws: dict[str, Tried] = {}
+    for tried, _ in sorted(able, key=lambda each: promise[id(each[0].column)]):
         effect = tried.column.term.effect
         name = effect.id if effect.neutral is not None else effect.key
-        if name not in best or promise[id(tried.column)] < promise[id(best[name].column)]:
-            best[name] = tried
-    return Screening(alone, tuple(sorted(best.values(), key=lambda each: each.left)), _pairs(gram, refit, able))
+        if best.setdefault(name, tried).column.term.effect is not effect:
+            laws.setdefault(name, tried)
+    ranked, others = (tuple(sorted(each.values(), key=lambda one: one.left)) for each in (best, laws))
+    return Screening(alone, ranked, others, _pairs(gram, refit, able))
 
 
 def _pairs(gram: Gram, refit: list[int], able: Sequence[tuple[Tried, list[int]]]) -> tuple[tuple[Tried, Tried, float], ...]:

@@ -16,9 +16,10 @@ import numpy as np
 from ..identification.gauss_newton import Solution
 from ..model import Model
 from ..record import Array, Record
+from .along import Along
 from .candidates import candidates, place_of, scales_of
 from .locate import locate, moved_back, steady
-from .screen import Gram, blocks_of, columns_of, motions, narrowed
+from .screen import Gram, Promise, blocks_of, columns_of
 from .track import Fit, Track
 
 __all__ = ["Suspects", "prepare_suspects", "suspects"]
@@ -97,8 +98,8 @@ def suspects(model: Model, record: Record, bandwidth: float, floor: float) -> Su
     scales = scales_of(track)
     found = _present(track, model, missing)
     offered = [candidate for candidate in candidates(model, scales) if candidate.effect.id not in _SLOW_EFFECTS]
-    motion = motions(track)
-    trials = [term for candidate in offered for term in narrowed(track, fit, candidate, motion)]
+    promise = Promise(Along(track), fit)
+    trials = [term for candidate in offered for term in promise.narrowed(candidate)]
     for column in columns_of(track, fit, trials):
         effect = column.term.effect
         n_shapes = len(effect.parameters) - len(column.amplitudes)

@@ -18,7 +18,6 @@ import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from scipy.signal import lfilter
@@ -26,17 +25,36 @@ from scipy.signal import lfilter
 from ..identification.gauss_newton import Solution, minimise
 from ..identification.innovations import Run, noise_of, runs_of
 from ..model import Model
-from ..record import Array, Index, Record
+from ..record import Array, Index, Mask, Record
 from ..simulate import substeps
 from .universe import universe_of
 
-__all__ = ["Track", "resolution"]
+__all__ = ["Track", "Twin", "resolution"]
 
 _STEP_OF_RATE = 0.2
+_MOST_STEPS = 4  # per sample: the step is implicit, and what is faster than the observer changes nothing that it sees
 _SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
+_MOST_GAIN = 2.5  # times gain and 2 alpha + beta; at 4 the pursuit of a mass begins to swing
+_LIGHTEST = 4.0  # times lighter than the mass whose impulses lead it, a model at most
+_NOTHING = np.zeros(1)
 _SHORTEST = 200  # samples of a run
 _SHAKEN = 0.4  # steps of the encoder that count as its noise
 _LARGEST = 1e6  # of the force range; a model that escapes must cost much, not break the solver
+
+
+@dataclass(frozen=True, eq=False)
+class Twin:
+    """A recording that a model itself would have left, see :mod:`fric_nodes.diagnosis.twin`; per run of the track.
+
+    Attributes:
+        efforts: recorded force over each interval [F].
+        positions: recorded position at its end [x].
+        extras: force that led the model besides, behind its command path [F].
+    """
+
+    efforts: tuple[Array, ...]
+    positions: tuple[Array, ...]
+    extras: tuple[Array, ...]
 
 
 def resolution(position: Array) -> float:
@@ -59,7 +77,7 @@ class Track:
         time: start of each run in its record [s].
         record: number of each run's record.
         bandwidth: w [rad/s].
-        mass: by which an innovation becomes a force [F s^2/x].
+        mass: by which being behind becomes a force [F s^2/x].
         noise: of the position for each run [x].
         sizes: typical size of a linear parameter by its dimension, for those that are near zero.
     """
@@ -74,7 +92,7 @@ class Track:
 
     @classmethod
     def of(cls, records: Sequence[Record], bandwidth: float, model: Model) -> Track:
-        """Follow ``records`` with ``bandwidth`` [rad/s]; the inertia of ``model`` makes forces of innovations."""
+        """Follow ``records`` with ``bandwidth`` [rad/s]; the inertia of ``model`` sets the scale."""
         runs: list[Run] = []
         time: list[Array] = []
         number: list[int] = []
@@ -91,23 +109,6 @@ class Track:
         mass = model.plant.total_inertia(*model.plant_values)
         return cls(tuple(runs), tuple(time), tuple(number), bandwidth, mass, tuple(noise), _sizes(runs, mass))
 
-    def parts(self, n_parts: int) -> list[Track]:
-        """The same recordings cut into ``n_parts`` contiguous parts, each a track of its own."""
-        total = sum(run.effort.shape[0] for run in self.runs)
-        cuts = [round(total * k / n_parts) for k in range(n_parts + 1)]
-        found = []
-        for low, high in pairwise(cuts):
-            held = replace(self, runs=(), time=(), record=(), noise=())
-            begin = 0
-            for k, run in enumerate(self.runs):
-                n = run.effort.shape[0]
-                first, last = max(low - begin, 0), min(high - begin, n)
-                if last - first >= _SHORTEST:
-                    held = held.with_run(run.part(first, last), self.time[k][first:last], self.record[k], self.noise[k])
-                begin += n
-            found.append(held)
-        return found
-
     def with_run(self, run: Run, time: Array, record: int, noise: float) -> Track:
         """The same with one more run."""
         return replace(
@@ -118,20 +119,13 @@ class Track:
             noise=(*self.noise, noise),
         )
 
-    def with_runs_of(self, other: Track) -> Track:
-        """The runs of both."""
-        joined = self
-        for each in zip(other.runs, other.time, other.record, other.noise, strict=True):
-            joined = joined.with_run(*each)
-        return joined
-
     @property
     def starts(self) -> Index:
         """First residual of each run."""
         return np.cumsum([0, *(run.effort.shape[0] - self._settling(run) for run in self.runs)])[:-1]
 
     def _settling(self, run: Run) -> int:
-        return int(min(max(math.ceil(_SETTLING / (self.bandwidth * float(np.median(run.step)))), 20), run.effort.shape[0] // 3))
+        return int(min(max(math.ceil(_SETTLING / (self.bandwidth * run.sample_time)), 20), run.effort.shape[0] // 3))
 
     def joined(self, of_run: Sequence[Array]) -> Array:
         """Signals with one value per interval of each run, without the settling, joined, shape ``(n,)``."""
@@ -150,33 +144,30 @@ class Track:
 
     def gains(self, run: Run) -> tuple[float, float]:
         """Alpha and beta at the run's sample time."""
-        z = math.exp(-self.bandwidth * float(np.median(run.step)))
+        z = math.exp(-self.bandwidth * run.sample_time)
         return 1.0 - z * z, (1.0 - z) ** 2
 
-    def residual(self, model: Model, efforts: Sequence[Array] | None = None, positions: Sequence[Array] | None = None) -> Array:
-        """The force that ``model`` lacks [F] at the end of each interval, shape ``(n,)``.
-
-        Args:
-            model: that follows.
-            efforts: other forces than the recorded ones, per run.
-            positions: other positions than the recorded ones, per run.
-        """
+    def residual(self, model: Model, twin: Twin | None = None) -> Array:
+        """The force that ``model`` lacks [F] at the end of each interval, shape ``(n,)``; on a ``twin`` of the recordings."""
         universe = universe_of(model)
         values = universe.values(model)
         plant_values = np.array(model.plant_values)
+        # The impulses are those of one mass, whatever mass the model has: a light model must not be led with less force.
+        heavier = self.mass / model.plant.total_inertia(*model.plant_values)
         parts = []
         for k, run in enumerate(self.runs):
-            effort = run.effort if efforts is None else efforts[k]
-            position = run.position if positions is None else positions[k]
+            effort = run.effort if twin is None else twin.efforts[k]
+            extra = _NOTHING if twin is None else twin.extras[k]
+            position = run.position if twin is None else twin.positions[k]
             alpha, beta = self.gains(run)
+            gain = min(heavier, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
             state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k))
             found = np.empty(effort.shape[0])
-            universe.loops.observe(
-                values, effort, position, run.step, self.n_substeps(model, run), run.load, run.temperature,
-                alpha, beta, self.noise[k], state, *universe.inner_states(model), found,
+            universe.loops.pursue(
+                values, effort, extra, position, run.step, self.n_substeps(model, run), run.load, run.temperature,
+                alpha, beta, gain, self.noise[k], state, *universe.inner_states(model), found,
             )  # fmt: skip
-            scale = self.mass * self.gains(run)[1] / float(np.median(run.step)) ** 2
-            parts.append(scale * found)
+            parts.append(self.mass * beta / run.sample_time**2 * found)
         most = _LARGEST * max(float(np.ptp(run.effort)) for run in self.runs)
         return np.clip(np.nan_to_num(self.joined(parts), nan=most, posinf=most, neginf=-most), -most, most)
 
@@ -185,8 +176,12 @@ class Track:
         return float(self.time[k][0] - self.runs[k].step[0])
 
     def n_substeps(self, model: Model, run: Run) -> int:
-        """Steps of ``model`` per sample."""
-        return min(substeps(model, float(np.median(run.step)), _STEP_OF_RATE), 60)
+        """Steps of ``model`` per sample, enough for what the observer sees.
+
+        Bristles and contacts may be far faster than that; with four steps per sample the missing force differs from that with
+        as many as their rate asks for by less than 1/300 of what is missing.
+        """
+        return min(substeps(model, run.sample_time, _STEP_OF_RATE), _MOST_STEPS)
 
     def seen(self, of_run: Sequence[Array]) -> Array:
         """A force per interval as the observer would see it, were it missing: filtered, joined, shape ``(n,)``."""
@@ -201,14 +196,30 @@ class Track:
         with ThreadPoolExecutor(2) as pool:
             return list(pool.map(self.residual, models))
 
-    def fit(self, model: Model, names: Sequence[str], max_iterations: int = 12, bounds: Bounds | None = None) -> Fit:
-        """``model`` with the parameters ``names`` such that it lacks the least force."""
+    def scale(self, model: Model, names: Sequence[str]) -> Array:
+        """Size of each of the parameters ``names``.
+
+        A parameter near zero gets that of what would matter, or it could never leave.
+        """
+        values, declared = model.values, [parameter.declaration for parameter in model.parameters()]
+        index = [model.names.index(name) for name in names]
+        scale = np.array([max(abs(values[k]), self.sizes.get(declared[k].dimension, 0.0)) for k in index])
+        scale[scale == 0.0] = 1.0
+        return scale
+
+    def fit(
+        self,
+        model: Model,
+        names: Sequence[str],
+        max_iterations: int = 12,
+        bounds: Bounds | None = None,
+        rows: Mask | None = None,
+    ) -> Fit:
+        """``model`` with the parameters ``names`` such that it lacks the least force; in ``rows`` of it only, where given."""
         index = np.array([model.names.index(name) for name in names], dtype=np.int64)
         declared = [parameter.declaration for parameter in model.parameters()]
         values = model.values
-        # A parameter near zero is scaled by what would matter, or it could never leave.
-        scale = np.array([max(abs(values[k]), self.sizes.get(declared[k].dimension, 0.0)) for k in index])
-        scale[scale == 0.0] = 1.0
+        scale = self.scale(model, names)
         tiny = 1e-9
         lower = np.array(
             [max(declared[k].lower, tiny * s if declared[k].positive else -np.inf) for k, s in zip(index, scale, strict=True)]
@@ -225,11 +236,11 @@ class Track:
             return model.with_values(trial)
 
         answer = minimise(
-            lambda point: self.residual(at(point)),
+            lambda point: self.residual(at(point)) if rows is None else self.residual(at(point))[rows],
             values[index] / scale,
             lower / scale,
             upper / scale,
-            difference=1e-3,
+            difference=5e-3,  # smaller ones see single sticks and slips instead of their trend
             point_tolerance=1e-4,
             cost_tolerance=1e-5,
             max_iterations=max_iterations,

@@ -45,8 +45,16 @@ EFFECT = Effect(
     source="Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 34",
     parameters=(
         Parameter("force", "S_inf", "F", "surplus over the other terms' level after a long rest", lower=0.0, linear=True),
+        # Not to be told from the level of another term by any motion, and so left alone unless it is asked for.
         Parameter(
-            "initial", "S_0", "F", "surplus over the other terms' level of a fresh contact", lower=0.0, default=0.0, linear=True
+            "initial",
+            "S_0",
+            "F",
+            "surplus over the other terms' level of a fresh contact",
+            lower=0.0,
+            default=0.0,
+            linear=True,
+            shape=True,
         ),
         Parameter("time", "tau", "s", "time over which the contact strengthens", positive=True),
         Parameter("exponent", "beta", "1", "shape of the rise", lower=0.05, upper=5.0, default=1.0, shape=True),

@@ -42,8 +42,16 @@ EFFECT = Effect(
     source="Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 36",
     parameters=(
         Parameter("force", "S_inf", "F", "surplus over the other terms' level after a long rest", lower=0.0, linear=True),
+        # Not to be told from the level of another term by any motion, and so left alone unless it is asked for.
         Parameter(
-            "initial", "S_0", "F", "surplus over the other terms' level of a fresh contact", lower=0.0, default=0.0, linear=True
+            "initial",
+            "S_0",
+            "F",
+            "surplus over the other terms' level of a fresh contact",
+            lower=0.0,
+            default=0.0,
+            linear=True,
+            shape=True,
         ),
         Parameter("time", "tau", "s", "time in which half of the rise is done", positive=True),
         CREEP_LENGTH,

@@ -43,8 +43,16 @@ EFFECT = Effect(
     source="Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 39",
     parameters=(
         Parameter("force", "S_e", "F", "rise of the surplus with every factor e of the age", lower=0.0, linear=True),
+        # Not to be told from the level of another term by any motion, and so left alone unless it is asked for.
         Parameter(
-            "initial", "S_0", "F", "surplus over the other terms' level of a fresh contact", lower=0.0, default=0.0, linear=True
+            "initial",
+            "S_0",
+            "F",
+            "surplus over the other terms' level of a fresh contact",
+            lower=0.0,
+            default=0.0,
+            linear=True,
+            shape=True,
         ),
         Parameter("time", "tau", "s", "age at which the rise turns logarithmic", positive=True),
         CREEP_LENGTH,

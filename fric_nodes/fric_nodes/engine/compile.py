@@ -58,6 +58,7 @@ class Loops:
         simulate: motion from force.
         predict: force from motion.
         observe: one-step prediction along measured positions.
+        pursue: the model kept at measured positions by impulses.
         lead: motion along a given one, and the force that it takes.
         respond: the command path alone.
         fan: many copies of the plant over one interval; with its work space as an argument, being called at every sample.
@@ -66,6 +67,7 @@ class Loops:
     simulate: Callable[..., None]
     predict: Callable[..., None]
     observe: Callable[..., None]
+    pursue: Callable[..., None]
     lead: Callable[..., None]
     respond: Callable[..., None]
     fan: Callable[..., None]

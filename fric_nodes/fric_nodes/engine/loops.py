@@ -29,7 +29,7 @@ from .assembled import (
 )
 from .kernel import kernel, local_array
 
-__all__ = ["LOOPS", "advance", "fan", "lead", "observe", "predict", "respond", "simulate"]
+__all__ = ["LOOPS", "advance", "fan", "lead", "observe", "predict", "pursue", "respond", "simulate"]
 
 
 @kernel
@@ -160,14 +160,63 @@ def observe(
         states[j] = x[j]
 
 
+def pursue(
+    p: Any, u: Any, extra: Any, y: Any, h: Any, n_sub: int, load: Any, temperature: Any,
+    alpha: float, beta: float, gain: float, noise: float, states: Any, z: Any, memory: Any, behind: Any,
+    z_next: Any, constants: Any,
+) -> None:  # fmt: skip
+    """Make the model keep up with the measured positions ``y`` by impulses alone, as a force that it lacks would.
+
+    ``behind[k]`` is how far the model is behind ``y[k]`` [x], for ``len(u)`` intervals of lengths ``h`` [s]. After each the
+    velocity gets ``gain (beta e + alpha (e - e_before))/h``: with a ``gain`` of one, and were the model a mass alone, this is
+    the alpha-beta filter of :func:`observe`, but the position is never set, so that every bit of the motion has been paid for
+    by a force, whatever the model's own friction is. A contact that sticks exactly is the exception: a body at rest within
+    three times ``noise`` [x] of where it is seen is put there and left at rest. Where the sensor sees a motor, the
+    load is carried along, unless it sticks. A run that is part of a recording gives, after its ``states``, the time at which
+    it begins [s]. ``extra`` holds a force that acts behind the command path besides, one value or ``(n,)`` [F].
+    """
+    prepare(p, constants)
+    p = unpacked(p)
+    x, x_next = local_array(N_STATES), local_array(N_STATES)
+    for j in range(N_STATES):
+        x[j] = states[j]
+    s = Inner(z, z_next, memory, constants)
+    t = states[N_STATES] if states.shape[0] > N_STATES else 0.0
+    before = 0.0
+    for k in range(u.shape[0]):
+        h_sub = h[k] / n_sub
+        load_k = load[k] if load.shape[0] > 1 else load[0]
+        temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
+        besides = extra[k] if extra.shape[0] > 1 else extra[0]
+        for m in range(n_sub):
+            around = Surroundings(t + m * h_sub, load_k, temperature_k)
+            advance(p, x, x_next, s, command(u[k], h_sub, memory, p) + besides, h_sub, around)
+        e = y[k] - x[SEEN]
+        behind[k] = e
+        push = beta * e + alpha * (e - before)
+        before = e
+        if RIGID and x[SEEN_RATE] == 0.0 and abs(e) <= 3.0 * noise:
+            for j in range(0, N_STATES, 2):
+                x[j] += alpha * e
+            before = (1.0 - alpha) * e
+            push = 0.0
+        if SEEN != 0 and x[1] != 0.0:
+            x[1] += gain * push / h[k]
+        x[SEEN_RATE] += gain * push / h[k]
+        t += h[k]
+    for j in range(N_STATES):
+        states[j] = x[j]
+
+
 def lead(
     p: Any, u: Any, q: Any, v: Any, h: Any, n_sub: int, load: Any, temperature: Any, stiffness: float, damping: float,
-    states: Any, z: Any, memory: Any, y_out: Any, u_out: Any, z_next: Any, constants: Any,
+    states: Any, z: Any, memory: Any, y_out: Any, extra_out: Any, z_next: Any, constants: Any,
 ) -> None:  # fmt: skip
-    """Lead the model along a motion: a stiff spring and damper add to ``u`` what it takes to be at ``q`` with ``v``.
+    """Lead the model along a motion: a stiff spring and damper add to what ``u`` does what it takes to be at ``q`` with ``v``.
 
     ``q[k]`` and ``v[k]`` are wanted at the beginning of interval k, of length ``h[k]`` [s]; ``y_out[k]`` is the sensor's
-    position at its end and ``u_out[k]`` the command over it: together they are a recording of this model on that motion.
+    position at its end and ``extra_out[k]`` the force that spring and damper give over it, behind the command path, whose
+    delay would make them swing. Together with ``u`` they are a recording of this model on that motion.
     """
     prepare(p, constants)
     p = unpacked(p)
@@ -180,12 +229,12 @@ def lead(
         h_sub = h[k] / n_sub
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
-        given = u[k] + stiffness * (q[k] - x[SEEN]) + damping * (v[k] - x[SEEN_RATE])
+        extra = stiffness * (q[k] - x[SEEN]) + damping * (v[k] - x[SEEN_RATE])
         for m in range(n_sub):
             around = Surroundings(t + m * h_sub, load_k, temperature_k)
-            advance(p, x, x_next, s, command(given, h_sub, memory, p), h_sub, around)
+            advance(p, x, x_next, s, command(u[k], h_sub, memory, p) + extra, h_sub, around)
         y_out[k] = x[SEEN]
-        u_out[k] = given
+        extra_out[k] = extra
         t += h[k]
     for j in range(N_STATES):
         states[j] = x[j]
@@ -228,5 +277,5 @@ def fan(
         friction_out[i] = total / n_sub
 
 
-LOOPS = (simulate, predict, observe, lead, respond, fan)
+LOOPS = (simulate, predict, observe, pursue, lead, respond, fan)
 """The loops, in the order of :class:`fric_nodes.engine.compile.Loops`."""

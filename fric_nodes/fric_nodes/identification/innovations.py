@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -48,6 +49,11 @@ class Run:
     load: Array
     temperature: Array
     noise: float
+
+    @cached_property
+    def sample_time(self) -> float:
+        """The usual time between samples [s]."""
+        return float(np.median(self.step))
 
     def part(self, first: int, last: int) -> Run:
         """Intervals ``first`` to ``last`` (exclusive) as a run of their own."""

@@ -30,6 +30,7 @@ _FACTORS: dict[str, float] = {
 }
 _WRONG = math.log(2.5)  # a model may be off by this much without a unit being to blame
 _NEAR = math.log(1.45)
+_ALONE = math.log(30.0)  # by which friction alone, without the mass, speaks for a wrong unit
 _FOLLOWS = 0.95  # correlation with a reference that is followed
 
 
@@ -75,7 +76,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     tries = [f for value in (*_FACTORS.values(), *gear) for f in (value, 1.0 / value)]
     effort_off = min(off(1.0, g) for g in tries)
     position_off = min(off(s, 1.0) for s in tries) if seen else math.inf
-    if min(effort_off, position_off) < min(_NEAR, 0.5 * plain):
+    # Friction alone may well be several times what a model has; a unit is to blame when the mass says the same.
+    credible = seen or plain > _ALONE
+    if credible and min(effort_off, position_off) < min(_NEAR, 0.5 * plain):
         if effort_off <= position_off:
             return _of("effort", friction / evidence.friction(speed), evidence, "the model")
         return _of("position", evidence.inertia / mass, evidence, "the model")

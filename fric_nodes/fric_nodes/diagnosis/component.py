@@ -1,0 +1,196 @@
+"""In which component something sits that no known effect explains.
+
+A force has the signature of what makes it, also where its law isn't known. Each component has some ways in which it can act,
+free in what a law would fix: friction whose level or slope changes with time as it likes, friction that goes with the motor's
+force; an actuator whose gain changes with time as it likes; a load whose mass changes with time as it likes, a force that
+swings at one frequency whatever the axis does, a force that hangs on the position and lags behind it; a sensor whose reading
+is off by a wave along the travel. Each is fitted, together with the nominal parameters, to what is missing, and what it
+explains is held against the number of its coefficients (Schwarz's criterion); the best names the component. The effects of
+the registry take part: where one of them comes closest, its component is named.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..record import Array
+from .along import Motion, motions
+from .screen import Tried
+from .track import Fit, Track
+
+__all__ = ["Signature", "signatures"]
+
+_SPAN = 0.25  # [s], over which what may change with time is constant
+_ROWS = 6000  # that a fit uses at most
+_WAVES = 40  # periods along the travel that are tried
+_LAGS = 6  # widths of a force that lags behind the position
+
+
+@dataclass(frozen=True)
+class Signature:
+    """One way in which a component can act.
+
+    Attributes:
+        component: part of the machine.
+        title: the way, in words.
+        share: of the missing force's energy that it explains.
+        evidence: how far it is to be believed: the information criterion of Bayes, the smaller the better.
+    """
+
+    component: str
+    title: str
+    share: float
+    evidence: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Motions:
+    """What a force can hang on, one array per run: motion, applied force and time."""
+
+    motion: Sequence[Motion]
+    effort: Sequence[Array]
+    time: Sequence[Array]
+
+
+def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Signature]:
+    """What each component could have to do with the force that ``fit`` lacks, the likeliest first.
+
+    Args:
+        track: the recordings.
+        fit: whose residual is to be explained.
+        tried: effects of the registry with what they leave, if they are to take part.
+    """
+    missing = fit.residual
+    stride = max(missing.shape[0] // _ROWS, 1)
+    nominal = fit.jacobian[::stride]
+    target = missing[::stride]
+    alone = _left(nominal, target)
+    # A low-passed signal holds about so many independent numbers.
+    independent = max(0.5 * track.bandwidth * float(sum(np.sum(run.step) for run in track.runs)), 50.0)
+    held = _Motions(motions(track), [run.effort for run in track.runs], track.time)
+    found: dict[str, Signature] = {}
+    for component, title, columns in _ways(track, held, missing):
+        n = columns.shape[1]
+        left = _left(np.concatenate([nominal, columns[::stride]], axis=1), target)
+        signature = _marked(component, title, left / max(alone, 1e-300), n, independent)
+        if title not in found or signature.evidence < found[title].evidence:
+            found[title] = signature
+    best = min(tried, key=lambda each: each.left, default=None)
+    if best is not None:
+        from .candidates import place_of
+
+        effect = best.column.term.effect
+        left = best.left / max(best.left + best.gain, 1e-300)
+        found[effect.title] = _marked(place_of(effect), effect.title, left, len(effect.parameters), independent)
+    return sorted(found.values(), key=lambda each: each.evidence)
+
+
+def _marked(component: str, title: str, left: float, n: int, independent: float) -> Signature:
+    """The signature of ``n`` coefficients that leave the share ``left`` of ``independent`` numbers."""
+    left = max(left, 1e-6)
+    return Signature(component, title, 1.0 - left, independent * math.log(left) + n * math.log(independent))
+
+
+def _left(columns: Array, target: Array) -> float:
+    """Sum of squares of ``target`` that the columns leave."""
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns[:, size > 0.0] / size[size > 0.0]
+    normal = columns.T @ columns + 1e-9 * np.eye(columns.shape[1])
+    weight = np.linalg.solve(normal, columns.T @ target)
+    return float(np.sum((target - columns @ weight) ** 2))
+
+
+def _ways(track: Track, held: _Motions, missing: Array) -> Iterator[tuple[str, str, Array]]:
+    """Component, way, and its columns, shape ``(n, n_columns)`` each."""
+    rate = [each.velocity for each in held.motion]
+    fast = max(float(np.quantile(np.abs(np.concatenate(rate)), 0.9)), 1e-12)
+    way = [np.tanh(v / (0.02 * fast)) for v in rate]
+    guideway, load = "guideway friction", "load"
+    yield guideway, "friction whose level changes with time", _changing(track, way, held.time)
+    yield guideway, "friction whose slope changes with time", _changing(track, rate, held.time)
+    driven = [sign * np.abs(u) for sign, u in zip(way, held.effort, strict=True)]
+    yield guideway, "friction that goes with the motor's force", _seen(track, [driven])
+    yield "command path", "an actuator whose gain changes with time", _changing(track, held.effort, held.time)
+    yield load, "a mass that changes with time", _changing(track, [each.acceleration for each in held.motion], held.time)
+    yield load, "a force that swings at one frequency", _tone(track, held.time, missing)
+    for lagging in _lags(held.motion):
+        yield load, "a force that hangs on the position and lags behind it", _seen(track, lagging)
+    for wave in _waves(held.motion):
+        yield "sensor", "a reading that is off by a wave along the travel", _seen(track, wave)
+
+
+def _seen(track: Track, signals: Sequence[Sequence[Array]]) -> Array:
+    """Columns of forces, as the observer sees them; each of ``signals`` has one array per run."""
+    return np.stack([track.seen(list(each)) for each in signals], axis=1)
+
+
+def _changing(track: Track, signal: Sequence[Array], time: Sequence[Array]) -> Array:
+    """Columns of ``signal`` within each span of time and zero outside."""
+    column = track.seen(list(signal))
+    # Spans of one run aren't those of another, also where the clocks of two recordings show the same.
+    number, first = [], 0
+    for each in time:
+        span = ((each - each[0]) / _SPAN).astype(np.int64)
+        number.append(first + span)
+        first += int(span[-1]) + 1
+    which = np.concatenate(track.split(track.joined(number))).astype(np.int64)
+    columns = np.zeros((column.shape[0], int(which[-1]) + 1))
+    columns[np.arange(column.shape[0]), which] = column
+    return columns
+
+
+def _tone(track: Track, time: Sequence[Array], missing: Array) -> Array:
+    """A sine and a cosine at the frequency at which most force is missing, for each run."""
+    parts = track.split(missing)
+    longest = max(range(len(parts)), key=lambda k: parts[k].shape[0])
+    step = track.runs[longest].sample_time
+    n = parts[longest].shape[0]
+    power = np.abs(np.fft.rfft(parts[longest] * np.hanning(n), 4 * n)) ** 2
+    power[: 4 * 8] = 0.0  # slower than eight swings is a drift
+    frequency = float(np.fft.rfftfreq(4 * n, step)[int(np.argmax(power))])
+    waves = []
+    for k in range(len(time)):
+        for function in (np.sin, np.cos):
+            signal = [np.zeros_like(each) for each in time]
+            signal[k] = function(2.0 * math.pi * frequency * time[k])
+            waves.append(signal)
+    return _seen(track, waves)
+
+
+def _lags(motion: Sequence[Motion]) -> Iterator[list[list[Array]]]:
+    """What follows the position with a play: forces in proportion to it, also from some place on only."""
+    everywhere = np.concatenate([each.position for each in motion])
+    low, travel = float(np.min(everywhere)), max(float(np.ptp(everywhere)), 1e-12)
+    for width in travel * np.geomspace(0.01, 0.3, _LAGS):
+        follower = [_follower(each.position, float(width)) for each in motion]
+        yield [
+            follower,
+            *([np.maximum(each - (low + share * travel), 0.0) for each in follower] for share in (0.2, 0.35, 0.5, 0.65, 0.8)),
+            [np.abs(each - each[0]) for each in follower],
+        ]
+
+
+def _follower(position: Array, play: float) -> Array:
+    """A point that the position drags along with a play of ``2 play``, shape ``(n,)``."""
+    result = np.empty_like(position)
+    at = float(position[0])
+    for k, q in enumerate(position.tolist()):
+        at = max(q - play, min(q + play, at))
+        result[k] = at
+    return result
+
+
+def _waves(motion: Sequence[Motion]) -> Iterator[list[list[Array]]]:
+    """The acceleration of an error of the reading, phase by phase of a wave, for periods over the travel."""
+    travel = max(float(np.ptp(np.concatenate([each.position for each in motion]))), 1e-12)
+    for number in np.geomspace(0.7, 25.0, _WAVES):
+        wave = 2.0 * math.pi * float(number) / travel
+        yield [
+            [change(each) * function(wave * each.position) for each in motion]
+            for function in (np.sin, np.cos)
+            for change in (lambda each: each.acceleration, lambda each: each.velocity**2)
+        ]
