@@ -11,7 +11,7 @@ from fric_nodes.diagnosis.suspects import suspects
 from fric_nodes.diagnosis.watch import Phase, Watch, WatchSettings
 from fric_nodes.model import Model, Term, build_model, term
 from fric_nodes.record import Array
-from fric_nodes.simulate import substeps
+from fric_nodes.simulate import Simulator, substeps
 
 H = 0.002
 
@@ -38,15 +38,29 @@ def driven(parts: Sequence[tuple[Model, float]], seed: int = 0) -> tuple[Array, 
     for model, span in parts:
         n = round(span / H)
         position, effort = np.empty(n), np.empty(n)
-        model.loops.lead(
-            model.values, np.zeros(n), wanted[at : at + n].copy(), rate[at : at + n].copy(), np.full(n, H), substeps(model, H),
-            np.ones(1), np.zeros(1), 2.0 * 80.0**2, 2.8 * 80.0, state, *inner, position, effort,
-        )  # fmt: skip
+        if model.has_command_path:
+            _controlled(model, wanted[at : at + n], rate[at : at + n], state, position, effort)
+        else:
+            model.loops.lead(
+                model.values, np.zeros(n), wanted[at : at + n].copy(), rate[at : at + n].copy(), np.full(n, H),
+                substeps(model, H), np.ones(1), np.zeros(1), 2.0 * 80.0**2, 2.8 * 80.0, state, *inner, position, effort,
+            )  # fmt: skip
         positions.append(position)
         efforts.append(effort)
         at += n
     effort = np.concatenate(efforts)
     return time, np.round(np.concatenate(positions) / 1e-7) * 1e-7, effort + 0.3 * random.standard_normal(effort.size)
+
+
+def _controlled(model: Model, wanted: Array, rate: Array, state: Array, position: Array, effort: Array) -> None:
+    """The same spring and damper as a controller's command, which has to pass what the model has before its plant."""
+    moved = Simulator(model)
+    moved.states[:] = state
+    for k in range(wanted.shape[0]):
+        effort[k] = 2.0 * 80.0**2 * (wanted[k] - moved.position) + 2.8 * 80.0 * (rate[k] - moved.velocity)
+        moved.run(effort[k : k + 1], H)
+        position[k] = moved.position
+    state[:] = moved.states
 
 
 def feed(watch: Watch, time: Array, position: Array, effort: Array) -> list[tuple[float, Phase]]:

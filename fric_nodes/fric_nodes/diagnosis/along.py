@@ -132,4 +132,4 @@ class Along:
             values = model.values
             values[model.names.index(name)] += 1e-3 * size
             columns.append((self.residual(model.with_values(values)) - base) / 1e-3)
-        return np.stack(columns, axis=1)
+        return np.stack(columns, axis=1) if columns else np.zeros((base.shape[0], 0))

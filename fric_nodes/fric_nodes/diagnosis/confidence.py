@@ -21,9 +21,10 @@ def features(growth: Growth, step: Step) -> tuple[float, float]:
     """Logarithm of what the best rival leaves over what the effect leaves, and the share that nothing explains."""
     slack = 0.15 * step.floor + 0.01 * step.missing
     effect_id = step.term.split("#")[0]
-    others = [each.left for each in step.rivals if effect_id not in {name.split("#")[0] for name in each.names}]
+    others = [each.score for each in step.rivals if effect_id not in {name.split("#")[0] for name in each.names}]
     rival = min(others, default=step.before)
-    margin = math.log((max(rival - step.floor, 0.0) + slack) / (max(step.after - step.floor, 0.0) + slack))
+    own = step.after + step.price
+    margin = math.log((max(rival - step.floor, 0.0) + slack) / (max(own - step.floor, 0.0) + slack))
     return margin, growth.rest
 
 

@@ -8,6 +8,7 @@ without it, and with each rival in its place, everything is fitted anew. It ends
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -24,7 +25,7 @@ from .track import Bounds, Fit, Track
 from .twin import twins
 from .universe import worth_trying
 
-__all__ = ["Growth", "Rival", "State", "Step", "audit", "best_track", "grow", "refit"]
+__all__ = ["Growth", "Rival", "State", "Step", "audit", "best_track", "bounds_of", "free_names", "grow", "refit"]
 
 _TWINS = 3
 _PAIRS_FITTED = 2
@@ -42,6 +43,8 @@ _LITTLE = 0.004  # of what is missing at the start: laws that differ in form onl
 _CLEAR = 25.0  # times the floor
 _BY_CHANCE = 6.0  # and times what candidates take off twins
 _INFLATION = 2.0
+_LIGHTEST = 0.1  # of the mass that a fit began with
+_LOWEST_LIMIT = 0.2  # of the largest recorded force
 _MOST_FORCE = 2.0  # of the largest recorded force, a term's
 _SAME = 0.35  # of the floor: nothing is missing when less than this is left above it
 
@@ -105,6 +108,7 @@ class Step:
         missing: what was missing then, above the floor [F^2].
         rivals: what was fitted in its place, the best first.
         screened: all candidates at first order, the best first.
+        price: of its parameters [F^2], as rivals pay it.
     """
 
     term: str
@@ -114,6 +118,7 @@ class Step:
     missing: float
     rivals: tuple[Rival, ...]
     screened: tuple[Tried, ...]
+    price: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +164,7 @@ def free_names(model: Model) -> tuple[str, ...]:
 
 def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
     """``model`` fitted to the track, and what it leaves."""
-    fit = track.fit(model, free_names(model), max_iterations, _bounds(model, scales_of(track)))
+    fit = track.fit(model, free_names(model), max_iterations, bounds_of(model, scales_of(track)))
     made = twins(track, fit.model, _TWINS)
     chance = tuple(track.residual(fit.model, twin) for twin in made)
     floor = float(np.mean([_within_reason(track, fit, each) for each in chance]))
@@ -188,7 +193,7 @@ def fitted_with(
     the motion tells, at values fitted along it.
     """
     grown = fit.model.with_terms((*fit.model.terms, *(_start(each) for each in tried)))
-    names, bounds = free_names(grown), _bounds(grown, scales)
+    names, bounds = free_names(grown), bounds_of(grown, scales)
     starts = [grown, _moved(grown, fit, tried[0])]
     along = along or Along(track)
     if along.can(grown):
@@ -227,7 +232,7 @@ def _start(tried: Tried) -> Term:
     return Term(held.effect, tuple(values))
 
 
-def _bounds(model: Model, scales: Scales) -> Bounds:
+def bounds_of(model: Model, scales: Scales) -> Bounds:
     """Where nonlinear parameters make sense on this recording."""
     ranges = {
         "x/s": (0.3 * scales.slow, 2.0 * scales.speed),
@@ -246,12 +251,18 @@ def _bounds(model: Model, scales: Scales) -> Bounds:
                 found[f"{prefix}.{p.name}"] = (-_MOST_FORCE * scales.most, _MOST_FORCE * scales.most)
             if p.linear or p.shape:
                 continue
+            if p.dimension == "F" and p.positive:
+                found[f"{prefix}.{p.name}"] = (_LOWEST_LIMIT * scales.most, math.inf)
             strength = p.name in held.effect.amplitudes or held.effect.play is not None
             places = p.dimension == "x" and not p.positive
             around = ranges if strength or places else ranges | scale_of
             if p.dimension in around:
                 low, high = around[p.dimension]
                 found[f"{prefix}.{p.name}"] = (min(low, value), max(high, value))
+    for p in model.parameters():
+        if "." not in p.name and p.declaration.dimension == "F s^2/x":
+            # Nothing moves a body without mass under no force: a model of nothing lacks little, too.
+            found[p.name] = (_LIGHTEST * scales.mass, scales.mass / _LIGHTEST)
     if is_driven(model):
         found["load_share"] = (0.05, 0.95)
     return found
@@ -399,7 +410,7 @@ def audit(track: Track, begin: Model, end: Model) -> float:
     lacking = {"begin": 0.0, "end": 0.0}
     for rows in (first, ~first):
         for name, model in (("begin", begin), ("end", end)):
-            fitted = track.fit(model, free_names(model), 6, _bounds(model, scales_of(track)), rows).model
+            fitted = track.fit(model, free_names(model), 6, bounds_of(model, scales_of(track)), rows).model
             left = track.residual(fitted)[~rows]
             lacking[name] += float(left @ left)
     made = [track.residual(end, twin) for twin in twins(track, end, 2)]
@@ -421,11 +432,12 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         ]
         if rivals and state.left - rivals[0].left > max(_OF_FLOOR * state.floor, _TO_STAY * begin.excess):
             state = refit(track, rivals[0].fit.model, max_iterations=6)
-            steps[k] = Step(
-                rivals[0].names[0], without.left, state.left, without.floor, without.excess, tuple(rivals[1:]), found.tried
-            )
+            term, rivals = rivals[0].names[0], rivals[1:]
         else:
-            steps[k] = Step(step.term, without.left, state.left, without.floor, without.excess, tuple(rivals), found.tried)
+            term = step.term
+        price = _price(state.fit.model.terms[list(state.fit.model.prefixes).index(term)].effect, without.excess)
+        beside = without.left, state.left, without.floor, without.excess
+        steps[k] = Step(term, *beside, tuple(rivals), found.tried, price)
     return state, steps
 
 
@@ -450,7 +462,7 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> l
         fitted.append(_rival(track, state, offer, fit, found.tried))
     fitted.sort(key=lambda rival: rival.score)
     for k, rival in enumerate(fitted[:2]):
-        fit = track.fit(rival.fit.model, rival.fit.names, 8, _bounds(rival.fit.model, scales))
+        fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds_of(rival.fit.model, scales))
         fitted[k] = _rival(track, state, rival.offer, fit, found.tried)
     return sorted(fitted, key=lambda rival: rival.score)
 
@@ -458,11 +470,15 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> l
 def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, screened: tuple[Tried, ...]) -> Rival:
     left = unseen(track, fit, fit.residual)
     effects = [each.column.term.effect for each in offer]
-    n = sum(not p.shape for effect in effects for p in effect.parameters)
-    dear = _PER_PARAMETER * state.excess * n
+    dear = sum(_price(effect, state.excess) for effect in effects)
     names = [_name_of(fit.model, effect) for effect in effects]
     halfway = min((each.left for each in offer), default=left)
     return Rival(effects[0], left, fit, left + dear, offer, tuple(names), max(halfway, left), screened)
+
+
+def _price(effect: Effect, excess: float) -> float:
+    """What the parameters of ``effect`` cost [F^2]."""
+    return _PER_PARAMETER * excess * sum(not p.shape for p in effect.parameters)
 
 
 def _name_of(model: Model, effect: Effect) -> str:

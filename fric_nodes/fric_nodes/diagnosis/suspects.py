@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..identification.gauss_newton import Solution
-from ..model import Model
+from ..model import Model, Term
 from ..record import Array, Record
 from .along import Along
 from .candidates import candidates, place_of, scales_of
+from .grow import bounds_of, free_names
 from .locate import locate, moved_back, steady
 from .screen import Gram, Promise, blocks_of, columns_of
 from .track import Fit, Track
@@ -27,6 +28,7 @@ __all__ = ["Suspects", "prepare_suspects", "suspects"]
 _STEP = 0.02  # of a parameter's value, or of what would matter, for its column
 _OFFSET, _BY_RIVAL, _BY_REST = 0.5, 2.2, -3.0  # as for findings of a diagnosis
 _MOST = 0.995
+_REFINED, _REFINING, _NEAR = 4, 5, 2.5  # suspects, iterations, and times what the best leaves
 _HARDLY = 0.6  # of the missing energy: when the best suspect leaves more, it is no explanation
 _PER_COLUMN = 0.01  # of the missing energy, the price of a suspect's column
 _PER_SHAPE = 0.015  # and of each value of it that was chosen from a grid
@@ -73,6 +75,7 @@ class _Suspect:
     signed: bool
     n_shapes: int = 0
     left: float = math.inf
+    term: Term | None = None
 
 
 def prepare_suspects(model: Model) -> None:
@@ -103,9 +106,10 @@ def suspects(model: Model, record: Record, bandwidth: float, floor: float) -> Su
     for column in columns_of(track, fit, trials):
         effect = column.term.effect
         n_shapes = len(effect.parameters) - len(column.amplitudes)
-        found.append(_Suspect(effect.id, False, place_of(effect), column.parts, bool(column.amplitudes), n_shapes))
+        signed = bool(column.amplitudes)
+        found.append(_Suspect(effect.id, False, place_of(effect), column.parts, signed, n_shapes, term=column.term))
     energy = float(missing @ missing)
-    ranked = _ranked(track, missing, found, 0.9 * energy)
+    ranked = _refined(track, model, _ranked(track, missing, found, 0.9 * energy))
     base = min(floor**2 * n, 0.9 * energy)
     parts = [moved_back(part, record.sample_time, bandwidth) for part in track.padded(missing)]
     where = locate(track, [steady(part**2, record.sample_time) for part in parts], scales, model)
@@ -164,6 +168,23 @@ def _ranked(track: Track, missing: Array, found: list[_Suspect], most: float) ->
         if left < most and (key not in best or left < best[key].left):
             best[key] = replace(suspect, left=left)
     return sorted(best.values(), key=lambda each: each.left)
+
+
+def _refined(track: Track, model: Model, ranked: list[_Suspect]) -> list[_Suspect]:
+    """The foremost suspects with values fitted instead of tried, where several come near each other; the best first."""
+    near = [each for each in ranked[:_REFINED] if each.left < _NEAR * ranked[0].left]
+    if len(near) < 2:
+        return ranked
+    energy = float(np.sum(track.residual(model) ** 2))
+    for k, each in enumerate(near):
+        if each.term is None:
+            continue
+        grown = model.with_terms((*model.terms, each.term))
+        names = [name for name in free_names(grown) if name not in model.names]
+        fit = track.fit(grown, names, _REFINING, bounds_of(grown, scales_of(track)))
+        left = float(fit.residual @ fit.residual) + energy * (_PER_COLUMN * len(each.columns) + _PER_SHAPE * each.n_shapes)
+        near[k] = replace(each, left=min(left, each.left))
+    return sorted([*near, *(each for each in ranked if each not in ranked[: len(near)])], key=lambda each: each.left)
 
 
 def _verdict(ranked: list[_Suspect], energy: float, base: float, regime: str, strength: float, duration: float) -> Suspects:

@@ -1,15 +1,21 @@
-"""What a model lacks, as a force over time: an observer follows the measured motion and reports the force it had to add.
+"""What a model lacks, as a force over time: it is made to follow the measured motion, by impulses that are counted.
 
-Between two samples the model moves under the recorded force; at each sample its position and velocity are pulled to the
-measured position by constant gains with a double pole at exp(-w h). A constant force that the model lacks shows, after the
-observer has settled, as the innovation e = f h^2 / (m beta), so that
+Between two samples the model moves under the recorded force; at each sample its velocity gets an impulse from how far it is
+behind the measured position, e, and from how that has changed:
 
-    r = m beta e / h^2
+    m dv = M (beta e + alpha (e - e_before)) / h,     alpha = 1 - z^2,  beta = (1 - z)^2,  z = exp(-w h)
 
-is the missing force, low-passed without loss at frequency zero by two poles at w and late by 2/w. It is defined for every plant
-and every term (friction that sticks exactly, bristles, a body behind a gap, a lagging command), at rest as well as in motion,
-and needs no derivative of the measured position. The force that the model would have needed for the motion is u + r.
-Source: the alpha-beta filter as in :mod:`fric_nodes.identification.innovations`; r as a force is derived here.
+with M the mass that the model was meant to have. For a mass alone this has a double pole at z. A force f that the model lacks
+makes it lag until the impulses give that force: at frequency zero M beta e / h^2 = f, exactly, whatever friction, springs and
+masses the model has, since its position is never set. (An alpha-beta filter does set it, and what the jump of the position
+saves the model's own friction doesn't show as missing: the more friction a model has the less it seems to lack.) So
+
+    r = M beta e / h^2
+
+is the missing force, low-passed without loss at frequency zero by about two poles at w and late by 2/w. It is defined for every
+plant and every term (friction that sticks exactly, bristles, a body behind a gap, a lagging command), at rest as well as in
+motion, and needs no derivative of the measured position. The force that the model would have needed for the motion is u + r.
+Source: the gains are those of the alpha-beta filter in :mod:`fric_nodes.identification.innovations`; the rest is derived here.
 """
 
 from __future__ import annotations

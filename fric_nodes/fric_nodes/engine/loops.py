@@ -170,8 +170,8 @@ def pursue(
     ``behind[k]`` is how far the model is behind ``y[k]`` [x], for ``len(u)`` intervals of lengths ``h`` [s]. After each the
     velocity gets ``gain (beta e + alpha (e - e_before))/h``: with a ``gain`` of one, and were the model a mass alone, this is
     the alpha-beta filter of :func:`observe`, but the position is never set, so that every bit of the motion has been paid for
-    by a force, whatever the model's own friction is. A contact that sticks exactly is the exception: a body at rest within
-    three times ``noise`` [x] of where it is seen is put there and left at rest. Where the sensor sees a motor, the
+    by a force, whatever the model's own friction is. A contact that sticks exactly is the exception: where the body
+    rests and is seen to rest it is put where it is seen, and left at rest while it is within three times ``noise`` [x] of it. Where the sensor sees a motor, the
     load is carried along, unless it sticks. A run that is part of a recording gives, after its ``states``, the time at which
     it begins [s]. ``extra`` holds a force that acts behind the command path besides, one value or ``(n,)`` [F].
     """
@@ -195,11 +195,11 @@ def pursue(
         behind[k] = e
         push = beta * e + alpha * (e - before)
         before = e
-        if RIGID and x[SEEN_RATE] == 0.0 and abs(e) <= 3.0 * noise:
+        if RIGID and x[SEEN_RATE] == 0.0 and (k == 0 or abs(y[k] - y[k - 1]) <= 3.0 * noise):
             for j in range(0, N_STATES, 2):
                 x[j] += alpha * e
             before = (1.0 - alpha) * e
-            push = 0.0
+            push = beta * e if abs(e) > 3.0 * noise else 0.0
         if SEEN != 0 and x[1] != 0.0:
             x[1] += gain * push / h[k]
         x[SEEN_RATE] += gain * push / h[k]
