@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.identification.bootstrap import block_bootstrap, drawn_series, drawn_weights
+from fric_nodes.identification.bootstrap import Bootstrap, block_bootstrap, drawn_series, drawn_weights
 from fric_nodes.identification.problem import Problem
 from fric_nodes.identification.profile import profile
 from numpy.typing import NDArray
@@ -111,3 +111,10 @@ def test_a_parameter_that_cannot_be_bounded_has_no_limit() -> None:
     found = profile(problem, 0, 0.5)
     assert found.lower == -math.inf
     assert math.isfinite(found.upper)
+
+
+def test_of_nineteen_replicates_the_first_and_the_last_are_the_ends_of_ninety_per_cent() -> None:
+    # The next replicate lies below the first of 19 with probability 1/20.
+    estimates = np.arange(1.0, 20.0)[:, None]
+    low, high = Bootstrap(estimates, 1).interval(np.array([9.0]), 0.9)
+    assert (low[0], high[0]) == (2.0 * 9.0 - 19.0, 2.0 * 9.0 - 1.0)

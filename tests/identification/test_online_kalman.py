@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fric_nodes.identification.online import ESTIMATORS, Estimate, Estimator, State, make_estimator
-from fric_nodes.identification.online.loops import collapse, correct
+from fric_nodes.identification.online.loops import carry, collapse, correct, scatter, tell
 from fric_nodes.model import Model, build_model, term
 from fric_nodes.record import Record
 
@@ -234,12 +234,13 @@ def test_points_of_a_linear_system_give_its_mean_and_covariance(unscented: bool)
     width = math.sqrt(3.0)
     points = np.concatenate([[mean], mean + width * root.T, mean - width * root.T])
     moved = points @ system.T
-    found, led = np.empty(n), np.empty((n, n))
+    found, led, columns = np.empty(n), np.empty((n, n)), np.empty((n, n))
     work = np.empty((n, 3 * n + 5))
     collapse(
         points, np.ascontiguousarray(moved[:, 1:3]), np.empty((points.shape[0], 0)), n_theta, width, unscented, np.zeros(n),
-        found, work, led,
+        np.eye(n), columns, np.zeros(n), found, work, led,
     )  # fmt: skip
+    np.testing.assert_allclose(columns, system @ root, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(found, system @ mean, rtol=1e-9)
     np.testing.assert_allclose(led @ led.T, system @ root @ root.T @ system.T, rtol=1e-9, atol=1e-9)
 
@@ -247,3 +248,53 @@ def test_points_of_a_linear_system_give_its_mean_and_covariance(unscented: bool)
 def test_an_unknown_estimator_is_refused() -> None:
     with pytest.raises(ValueError, match="rls, ekf, ukf"):
         make_estimator("magic", structure())
+
+
+def test_later_samples_tell_of_the_beginning_what_the_joint_distribution_of_all_does() -> None:
+    # A parameter, position and velocity, and a force that is another in each interval; by conditioning all of them at once.
+    random = np.random.default_rng(5)
+    n, noise, force_noise = 4, 0.3, 0.5
+    begun = np.tril(random.standard_normal((n, n))) + 2.0 * np.eye(n)
+    begun[3] = [0.0, 0.0, 0.0, force_noise]
+    mean, system = random.standard_normal(n), np.eye(n)
+    system[1], system[2] = [0.1, 1.0, 0.4, 0.2], [0.3, -0.2, 0.9, 0.7]
+    forces, seen = random.standard_normal(3), random.standard_normal(3)
+    # Over all that is unknown: the beginning, and the forces of the second and third interval.
+    slope, joint_mean = np.hstack([np.eye(n), np.zeros((n, 2))]), np.concatenate([mean[:3], forces])
+    joint = np.zeros((n + 2, n + 2))
+    joint[:n, :n] = begun @ begun.T
+    joint[range(n, n + 2), range(n, n + 2)] = force_noise**2
+    rows = []
+    for k in range(3):
+        if k:
+            slope[3] = np.eye(n + 2)[n - 1 + k]
+        slope = system @ slope
+        rows.append(slope[1].copy())
+    looked = np.array(rows)
+    gain = joint @ looked.T @ np.linalg.inv(looked @ joint @ looked.T + noise**2 * np.eye(3))
+    expected_mean = joint_mean + gain @ (seen - looked @ joint_mean)
+    expected = joint - gain @ looked @ joint
+    now, root = mean.copy(), begun.copy()
+    now[3] = forces[0]
+    columns, later, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, 3 * n + 5))
+    shift, narrow, widen = np.zeros(n), np.eye(n), np.eye(n)
+    points, values, given = np.empty((2 * n + 1, n)), np.empty((2 * n + 1, 1)), np.empty(2 * n + 1)
+    states, none = np.empty((2 * n + 1, 2)), np.empty((2 * n + 1, 0))
+    for k in range(3):
+        before = root.copy()
+        scatter(
+            now, root, 1.0, forces[k], force_noise, np.zeros(n), np.eye(n), np.ones(1), np.array([0]), np.zeros(1),
+            np.full(1, -1e9), np.full(1, 1e9), points, values, given, states, none, none,
+        )  # fmt: skip
+        states[:] = (points @ system.T)[:, 1:3]
+        collapse(points, states, none, 1, 1.0, False, np.zeros(n), np.eye(n), later, np.zeros(n), now, work, root)
+        if k:
+            carry(columns, before, later, work)
+        else:
+            columns[:] = later
+        assert tell(now, root, 1, seen[k], noise, 1e9, columns, shift, narrow, widen, work)
+    start = np.append(mean[:3], forces[0])
+    np.testing.assert_allclose(start + begun @ shift, expected_mean[:n], rtol=1e-9)
+    left = begun @ narrow
+    np.testing.assert_allclose(left @ left.T, expected[:n, :n], atol=1e-9)
+    np.testing.assert_allclose(narrow @ widen, np.eye(n), atol=1e-9)

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from fric_nodes.bench import calibration_two_stage
 from fric_nodes.friction.dnlrx_file import dnlrx_from_text
 from fric_nodes.identification import METHODS
 from fric_nodes.identification.dnlrx.cost import Cost, differences, to_taps
@@ -286,3 +287,10 @@ def test_what_it_can_t_fit_is_refused(train: Record) -> None:
         fit(start_model(["coulomb", "stribeck"], "axis", train.units), [train], Options())
     with pytest.raises(IdentificationError, match="hold"):
         fit(start_model(["coulomb", "viscous"], "axis", train.units), [train], Options(held=("coulomb.force",)))
+
+
+def test_a_mass_that_slow_strokes_leave_at_its_bound_is_refused() -> None:
+    # Two kilograms take hardly any force in strokes of half a second; in this recording noise leaves none of it.
+    record = calibration_two_stage.recorded(61061, 0.5)
+    with pytest.raises(IdentificationError, match="excite faster motion"):
+        METHODS["two-stage"].fit(calibration_two_stage.structure(), [record], Options(decimation=25))

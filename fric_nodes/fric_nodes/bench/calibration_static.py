@@ -165,7 +165,7 @@ def pressures(seed: int) -> Finding:
     assert found.loads.line is not None
     line = found.loads.line
     result = {
-        "area": _by_freedom(found.loads.area, _AREA, len(_PRESSURES) - 2),
+        "area": _by_freedom(found.loads.area, _AREA, found.loads.area_freedom),
         "friction without pressure": _by_freedom(line.intercept, _DRY, line.freedom),
         "friction per pressure": _by_freedom(line.slope, _PER_PRESSURE, line.freedom),
     }

@@ -26,7 +26,7 @@ __all__ = ["Along", "Motion", "motions"]
 
 _SMOOTH = 4.0  # times the observer's bandwidth: of the motion
 _REST = 0.01  # of the fast speed, below which the body may rest
-_ITERATIONS = 8
+_ITERATIONS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +70,7 @@ class Along:
 
     def __init__(self, track: Track) -> None:
         self._track = track
+        self._path: tuple[object, list[Array]] | None = None
         self.motion = motions(track)
         speed = np.abs(np.concatenate([each.velocity for each in self.motion]))
         rest = max(_REST * float(np.quantile(speed, 0.98)), 4.0 * max(track.noise) * track.bandwidth)
@@ -93,8 +94,17 @@ class Along:
                 values, time - 0.5 * each.step, each.position, each.velocity, each.acceleration, each.step, run.load,
                 run.temperature, *universe.inner_states(model), effort, friction,
             )  # fmt: skip
-            found.append(effort - respond(model, run.effort, each.step))
+            found.append(effort)
+        found = [a - b for a, b in zip(found, self._applied(model), strict=True)]
         return np.nan_to_num(track.seen(found)[self.moving], nan=0.0, posinf=0.0, neginf=0.0)
+
+    def _applied(self, model: Model) -> list[Array]:
+        """What comes out of the command path of ``model`` [F], per run; that of the last model is kept."""
+        path = tuple((held.effect.key, held.values) for held in model.terms if held.effect.command is not None)
+        if self._path is None or self._path[0] != path:
+            runs = zip(self._track.runs, self.motion, strict=True)
+            self._path = path, [respond(model, run.effort, each.step) for run, each in runs]
+        return self._path[1]
 
     def fitted(self, model: Model, names: Sequence[str], scale: Array, bounds: Mapping[str, tuple[float, float]]) -> Model:
         """``model`` with the parameters ``names``, of the sizes ``scale``, such that it lacks least along the motion."""

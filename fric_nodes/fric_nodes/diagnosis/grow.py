@@ -34,8 +34,9 @@ _PER_PARAMETER = 0.012  # of what is missing
 _OTHER_LAWS = 2  # of the most promising effects are fitted in another law, too
 _FITTED = 4  # candidates that are fitted in full at each step
 _AGAIN = 0.05  # of what is missing: with more left, other beginnings are tried
-_BEGINNINGS = 2  # of them
-_MOST_TERMS = 5
+_BEGINNINGS = 1  # of them
+_HOPELESS = 0.5  # of what is missing: with more left, no exchange of a term makes an explanation
+_MOST_TERMS = 4
 _OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
 _OF_EXCESS = 0.12  # and of what is missing: less is no explanation
 _TO_STAY = 0.004  # of what is missing at the start, beside all other terms
@@ -362,11 +363,12 @@ def _settled(
     scales = scales_of(track)
     begin = refit(track, begin.fit.model, max_iterations=6)
     state, steps, gone = _pruned(track, begin, state, steps)
-    if len(steps) > 1:
+    rest = audit(track, begin.fit.model, state.fit.model) if steps else 1.0
+    if len(steps) > 1 and rest < _HOPELESS:
         state, steps = _exchanged(track, begin, state, steps, scales)
         state, steps, more = _pruned(track, begin, state, steps)
         gone += more
-    rest = audit(track, begin.fit.model, state.fit.model) if steps else 1.0
+        rest = audit(track, begin.fit.model, state.fit.model)
     if rest > 1.0:
         gone += [(step.term, "made what it was not fitted to worse") for step in steps]
         state, steps, rest = begin, [], 1.0

@@ -23,7 +23,7 @@ from .universe import universe_of
 __all__ = ["smooth", "twins"]
 
 _SMOOTH = 4.0  # times the observer's bandwidth: of the motion that a twin is led along
-_LED = 1.5  # times the observer's bandwidth: of the spring that leads it
+_LED = 4.0  # times the observer's bandwidth: of the spring that leads it; with a softer one a model sticks and slips
 
 
 def smooth(signal: Array, step: float, cutoff: float) -> Array:
@@ -42,7 +42,7 @@ def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
     position = np.concatenate([[run.start[0]], run.position])
     wanted = smooth(position, step, _SMOOTH * track.bandwidth)
     rate = np.gradient(wanted, step)
-    lead = min(_LED * track.bandwidth, 0.15 / step)
+    lead = min(_LED * track.bandwidth, 0.3 / step)
     plant_values = np.array(model.plant_values)
     state = np.append(universe.plant.start(plant_values, float(wanted[0]), float(rate[0])), track.begin(k))
     given = smooth(run.effort, step, _SMOOTH * track.bandwidth)

@@ -20,26 +20,22 @@ from typing import Any
 import numpy as np
 from scipy import signal
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import maximum_filter1d
 
 from ..model import Model
 from ..record import Array, Index, Mask, Record, RecordError
+from .rests import MIN_ROWS, SLOW, Rests, at_rest, can_stand_for, velocity_noise
 from .result import IdentificationError, Options
 from .statistics import noise_of
 
-__all__ = ["FINER", "Equations", "Motion", "Stretch", "at_rest", "equations", "nominal_conditions", "surroundings"]
+__all__ = ["FINER", "Equations", "Motion", "Stretch", "equations", "nominal_conditions", "surroundings"]
 
 FINER = 4
 """Steps per sample of the motion that friction states are led along."""
 
 _FILTER_ORDER = 4
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
-_MIN_ROWS = 20
-_REST_TIME = 0.015  # [s] slower than the limit before it counts as rest
-_REST_ROWS = 2
 _WINDOW_BAND = 0.6  # of the row rate: band of white noise of as much power in the derivative
 _MARGIN = 0.25  # of the cutoff's period: how far the filter on the position carries a rest
-_FEW = 0.1  # share of the sliding rows, in each direction, below which clear ones can't stand for them
 _HIGHEST = 0.36  # of the sampling rate: cutoff where bristles are to be seen and the position is quiet enough
 _QUIET = 2e-4  # noise of the velocity beside its own root mean square
 
@@ -141,6 +137,7 @@ class Equations:
             is so.
         rest_velocity: speed below which it may be at rest [x/s].
         notes: what was left out, and why.
+        rests: what tells them.
         cutoff: of the filter on the position [Hz].
     """
 
@@ -154,6 +151,7 @@ class Equations:
     clear: Mask
     rest_velocity: float
     notes: tuple[str, ...]
+    rests: Rests
     cutoff: float = 0.0
 
     def rows(self, of_stretch: Callable[[Stretch], Array]) -> Array:
@@ -181,7 +179,7 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
     if not stretches:
         raise IdentificationError(
             ", ".join(record.source for record in records),
-            f"no valid part is longer than {(2 * edge + _MIN_ROWS * decimation) / rate:.2f} s",
+            f"no valid part is longer than {(2 * edge + MIN_ROWS * decimation) / rate:.2f} s",
             "record for longer, or raise the cutoff",
         )
     thin = partial(_thin, edge, decimation)
@@ -190,12 +188,17 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
     # Taken as they are: a time stamp needs no filter.
     time = np.concatenate([s.time[edge : s.time.shape[0] - edge : decimation] for s in stretches])
     starts: Index = np.cumsum([0, *(part.shape[0] for part in force[:-1])], dtype=np.int64)
-    rest = still = options.rest_velocity
-    if rest is None or still is None:
+    reach = (decimation if decimation > 1 else 0) + int(np.ceil(_MARGIN / cutoff * rate))
+    given = options.rest_velocity
+    noise = _unclear(stretches, cutoff) if given is None else 0.0
+    speeds, steps = tuple(s.velocity for s in stretches), tuple(s.sample_time for s in stretches)
+    rests = Rests(speeds, steps, noise, edge, decimation, reach)
+    if given is None:
         # Below its own noise a velocity says nothing, however slow the rest of the recording is.
-        rest = 0.02 * float(np.quantile(np.abs(velocity), 0.98))
-        still = max(rest, _unclear(stretches, cutoff))
-        rest = max(rest, _unclear(stretches, min(cutoff, _WINDOW_BAND * rate / decimation)))
+        slow = SLOW * float(np.quantile(np.abs(velocity), 0.98))
+        still, rest = max(slow, noise), max(slow, _unclear(stretches, min(cutoff, _WINDOW_BAND * rate / decimation)))
+    else:
+        still = rest = given
     resting = [at_rest(part, rest, decimation / rate) for part in np.split(velocity, starts[1:])]
     sliding = ~np.concatenate(resting)
     rest_time = float(np.sum(~sliding)) * decimation / rate
@@ -203,19 +206,15 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
         notes.append(
             f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) don't count for sliding friction"
         )
-    reach = (decimation if decimation > 1 else 0) + int(np.ceil(_MARGIN / cutoff * rate))
-    rested = [
-        _near(at_rest(s.velocity, still, s.sample_time), reach)[edge : s.time.shape[0] - edge : decimation] for s in stretches
-    ]
-    clear = sliding & ~np.concatenate(rested)
-    if not _can_stand_for(clear, sliding, velocity):
+    clear = sliding & rests.clear(still)
+    if not can_stand_for(clear, sliding, velocity):
         clear = sliding
         notes.append(
             "rests follow each other too closely for the filter: equations that they reach into are used too; record longer "
             "strokes, or raise the cutoff"
         )
     return Equations(
-        tuple(stretches), thin, np.concatenate(force), velocity, time, starts, sliding, clear, rest, tuple(notes), cutoff
+        tuple(stretches), thin, np.concatenate(force), velocity, time, starts, sliding, clear, rest, tuple(notes), rests, cutoff
     )
 
 
@@ -264,49 +263,9 @@ def _thin(edge: int, decimation: int, stretch: Stretch, values: Array) -> Array:
     return np.asarray(rows[:wanted] @ window, dtype=np.float64)
 
 
-def _near(mask: Mask, reach: int) -> Mask:
-    """True for each sample within ``reach`` samples of one that is True in ``mask``."""
-    return np.asarray(maximum_filter1d(mask.astype(np.uint8), 2 * reach + 1) > 0, dtype=np.bool_)
-
-
-def _can_stand_for(clear: Mask, sliding: Mask, velocity: Array) -> bool:
-    """Whether enough rows are ``clear`` in each direction in which the joint slides."""
-    return all(
-        np.sum(clear & way) >= max(_MIN_ROWS, _FEW * np.sum(sliding & way)) or np.sum(sliding & way) < _MIN_ROWS
-        for way in (velocity > 0.0, velocity < 0.0)
-    )
-
-
 def _unclear(stretches: Sequence[Stretch], band: float) -> float:
     """Velocity that noise alone may show in ``band`` [Hz]."""
-    return 4.0 * max(_velocity_noise(stretch, band) for stretch in stretches)
-
-
-def _velocity_noise(stretch: Stretch, band: float) -> float:
-    """Standard deviation [x/s] of the filtered velocity due to noise and steps of the position signal, were it to stand still.
-
-    White noise of s on the position gives s 2 pi band^1.5 sqrt(2/3 sample_time) after filtering to ``band`` [Hz] and
-    differentiation. What the filter took away from the position is noise, and motion too quick for it: the quieter windows hold
-    the noise.
-    """
-    length = max(round(0.1 / stretch.sample_time), 4)
-    away = stretch.raw_position - stretch.position
-    windows = away[: away.shape[0] // length * length].reshape(-1, length)
-    quiet = float(np.sqrt(np.quantile(np.mean(windows**2, axis=1), 0.25)))
-    # Rounding of the position itself, which filters add up over many samples.
-    rounding = 1e-13 * float(np.max(np.abs(stretch.raw_position)))
-    return float((quiet + rounding) * 2.0 * np.pi * band**1.5 * np.sqrt(2.0 / 3.0 * stretch.sample_time))
-
-
-def at_rest(velocity: Array, limit: float, row_time: float) -> Mask:
-    """True where the joint stays slower than ``limit`` for a while; passing through zero at a reversal is no rest."""
-    slow = np.abs(velocity) <= limit
-    bounds = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))
-    resting = np.zeros(velocity.shape[0], dtype=np.bool_)
-    for first, last in zip(bounds[::2], bounds[1::2], strict=True):
-        if (last - first) * row_time > _REST_TIME and last - first >= _REST_ROWS:
-            resting[first:last] = True
-    return resting
+    return 4.0 * max(velocity_noise(s.raw_position, s.position, s.sample_time, band) for s in stretches)
 
 
 def _stretches(record: Record, cutoff: float, edge: int, notes: list[str]) -> list[Stretch]:
@@ -316,7 +275,7 @@ def _stretches(record: Record, cutoff: float, edge: int, notes: list[str]) -> li
     found = []
     too_short = 0.0
     for first, last in zip(bounds[::2], bounds[1::2], strict=True):
-        if last - first < 2 * edge + _MIN_ROWS:
+        if last - first < 2 * edge + MIN_ROWS:
             too_short += (last - first) * record.sample_time
             continue
         found.append(_stretch(record, int(first), int(last), cutoff))

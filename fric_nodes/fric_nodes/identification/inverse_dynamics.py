@@ -113,8 +113,10 @@ def _search_static(model: Model, found: Equations, free: FreeParameters, robust:
     best = _fit_linear(model, found, linear, use, robust)
     level = float(np.median(np.abs(found.force[use])))
     declared = list(model.parameters())
-    for number in nonlinear.index:
+    for number, lower, upper in zip(nonlinear.index, nonlinear.lower, nonlinear.upper, strict=True):
         for value in candidates(declared[number].declaration.dimension, found, level):
+            if not lower <= value <= upper:
+                continue
             trial_values = best.values.copy()
             trial_values[number] = value
             trial = _fit_linear(model.with_values(trial_values), found, linear, use, robust)
@@ -129,8 +131,11 @@ def _search_dynamic(model: Model, found: Equations, free: FreeParameters, robust
     use = np.ones(found.force.shape[0], dtype=np.bool_)
     level = float(np.median(np.abs(found.force)))
     best, best_cost = model, np.inf
-    for number in free.only(False).index:
+    nonlinear = free.only(False)
+    for number, lower, upper in zip(nonlinear.index, nonlinear.lower, nonlinear.upper, strict=True):
         for value in candidates(declared[number].declaration.dimension, found, level):
+            if not lower <= value <= upper:
+                continue
             values = best.values
             values[number] = value
             trial = model.with_values(values)

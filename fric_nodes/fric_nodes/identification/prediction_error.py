@@ -240,7 +240,7 @@ def _prepared(model: Model, free: FreeParameters, runs: Sequence[Run], force_sha
 
 
 def _substeps(model: Model, runs: Sequence[Run]) -> int:
-    return max(substeps(model, float(np.median(run.step)), _STEP_OF_RATE) for run in runs)
+    return max(substeps(model, run.sample_time, _STEP_OF_RATE) for run in runs)
 
 
 def _other_starts(start: Model, free: FreeParameters, found: Equations) -> list[Model]:

@@ -166,7 +166,7 @@ class StepView:
         self.runs = [run for record in records for run in runs_of(record)]
         if not self.runs:
             raise IdentificationError(records[0].source, "no valid part is long enough", "record for longer")
-        self._n_substeps = max(substeps(model, float(np.median(run.step)), _STEP_OF_RATE) for run in self.runs)
+        self._n_substeps = max(substeps(model, run.sample_time, _STEP_OF_RATE) for run in self.runs)
         self.index = index or min(_INDICES, key=lambda trial: float(np.sum(self._innovations(model, trial) ** 2)))
 
     def _innovations(self, model: Model, index: float) -> Array:

@@ -42,6 +42,7 @@ from .verdict import warnings_of
 
 __all__ = ["METHOD", "TwoStageIdentification", "fit"]
 
+_NO_MASS = 2.0 * float(np.finfo(np.float64).tiny)  # its lower bound
 _REPLACED = {"coulomb", "presliding/maxwell_slip"}
 _USUAL_ORDER = 3
 
@@ -137,7 +138,7 @@ def _mechanism(
     found = find_mechanism(base, free, prepared, dnlrx.model.thresholds)
     if found is not None and dnlrx.trials:
         found = without_surplus(base, free, prepared, found)
-    if found is None or ("mass" in free.names and found.linear[free.names.index("mass")] <= 0.0):
+    if found is None or ("mass" in free.names and found.linear[free.names.index("mass")] <= _NO_MASS):
         raise IdentificationError(
             records[0].source,
             "no mass and springs explain the force",

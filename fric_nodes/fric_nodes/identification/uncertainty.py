@@ -117,7 +117,7 @@ def problem_of(result: Identification, records: Sequence[Record], options: Optio
     if result.method == inverse_dynamics.METHOD.id:
         return _of_inverse_dynamics(result.model, free, found, options.robust)
     if result.method == output_error.METHOD.id:
-        return output_error.problem(result.model, free, found, options.horizon)[0]
+        return output_error.problem(result.model, free, found, options.horizon, options)[0]
     if result.method == prediction_error.METHOD.id:
         return prediction_error.problem(result.model, free, records, found)
     known = ", ".join(part.METHOD.id for part in (inverse_dynamics, output_error, prediction_error))
@@ -133,7 +133,7 @@ def _bootstrap(result: Identification, problem: Problem, records: Sequence[Recor
         found = block_bootstrap(problem, n_replicates=_REPLICATES)
         return found, f"{found.estimates.shape[0]} replicates from blocks of {found.length} equations"
     draws = output_error.problem(
-        result.model, _free(result, options), equations(list(records), options, result.model), options.horizon
+        result.model, _free(result, options), equations(list(records), options, result.model), options.horizon, options
     )[1]
     estimates = []
     for moved in islice(draws, _REPLICATES):

@@ -11,11 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, maximum_filter1d, uniform_filter1d
 
 from ..record import Array, Mask
 from .check import Check, Evidence, Finding, each
-from .view import View, friction_along, runs
+from .view import View, balance_on, friction_along, runs
 
 __all__ = ["CHECK", "Stop", "stops"]
 
@@ -59,9 +59,20 @@ def _spring(position: Array, effort: Array, away: Mask) -> Array:
 
 
 def _inertial(view: View) -> tuple[float, Array]:
-    """Sign that the effort should have, and what of it accelerates the axis, as far as that is known, ``(n_samples,)`` [F]."""
+    """Sign that the effort should have, and what of it accelerates the axis, as far as that is known, ``(n_samples,)`` [F].
+
+    The mass is that of the motion away from the ends: at a stop it is the stop that brings the joint to rest, not the force.
+    """
     friction, error, _ = friction_along(view)
-    mass, mass_error = view.balance.value("mass"), view.balance.error("mass")
+    position = view.even.position
+    near = max(_NEAR * view.travel, 1.5 * view.resolution)
+    ends = (position - np.min(position) < near) | (np.max(position) - position < near)
+    width = round((_SLOPE_TIME + 1.0 / view.cutoff) / view.h)
+    apart = view.sliding & ~maximum_filter1d(ends, 2 * width + 1)
+    balance = balance_on(view, np.flatnonzero(apart))
+    if not balance.value("mass") > 4.0 * balance.error("mass"):
+        balance = view.balance
+    mass, mass_error = balance.value("mass"), balance.error("mass")
     side = -1.0 if friction < -4.0 * error and mass < 0.0 else 1.0
     if not side * mass > 4.0 * mass_error:
         return side, np.zeros(view.record.n_samples)
@@ -97,7 +108,11 @@ def stops(view: View) -> list[Stop]:
         push = outward * (effort - _spring(position, effort, moving))
         if not np.any(moving):
             continue
-        needed = float(np.quantile((push - outward * inertial)[moving], 0.995)) + _HARDER * spread
+        # Means over the shortest stand: what lasts for less, a reversal or an inertia a sample off, holds nothing still.
+        lasting = max(round(_SHORTEST / step), 1)
+        push, against = (uniform_filter1d(part, lasting) for part in (push, push - outward * inertial))
+        apart = moving & ~maximum_filter1d(there, lasting + 1)
+        needed = float(np.quantile(against[apart if np.any(apart) else moving], 0.995)) + _HARDER * spread
         for first, last in runs(there & slow):
             most = float(np.max(push[first:last]))
             if time[last - 1] - time[first] < _SHORTEST or most < needed:

@@ -30,7 +30,7 @@ from ...model import Model
 from ...record import Array, Index
 from ..free_parameters import FreeParameters
 from ..scoring import force_along
-from ..statistics import bartlett_lag, sandwich_covariance
+from ..statistics import bartlett_lag, covariance_by_parts
 from .linear import least_squares as determined
 from .samples import FILTER_ORDER, Prepared, Samples
 
@@ -260,7 +260,7 @@ def _covariance(jacobian: Array, residual: Array, starts: Index) -> Array:
     but it is too small where it happens to be small. The other one takes the variance, and how much more the correlation in
     time lets sums vary than white noise would, from all of the residual.
     """
-    sandwich = sandwich_covariance(jacobian, residual, np.ones(residual.shape[0]), starts)
+    sandwich = covariance_by_parts(jacobian, residual, np.ones(residual.shape[0]), starts)
     size = np.linalg.norm(jacobian, axis=0)
     size[size == 0.0] = 1.0
     scaled = jacobian / size

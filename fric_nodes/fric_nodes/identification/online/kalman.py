@@ -3,7 +3,9 @@
 A filter needs to begin near enough. Recursive least squares on the same samples tells, from the first motion in both
 directions, every parameter in which the force is linear; with five times its standard errors, so that the same samples may
 be used again, that is where the filter begins. Nonlinear parameters begin at the structure's values. What has been recorded
-meanwhile then goes through the filter, for each of the nonlinear ones from a few start values; the likeliest goes on.
+meanwhile then goes through the filter, for each of the nonlinear ones from a few start values; the likeliest goes on. From it
+two passes with a louder force lead near enough for slopes to hold: with values far off, the innovations would be taken for
+kicks, and what the first samples say be believed at the wrong slopes.
 
 A step change of friction shows as force residuals that stay on one side for longer than they ever do. What was known of the
 terms' linear parameters is then given up; if it goes on, what was known of all.
@@ -12,7 +14,7 @@ terms' linear parameters is then given up; if it goes on, what was known of all.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from ..free_parameters import FreeParameters
 from ..innovations import noise_of
 from ..result import Options
 from .estimate import Estimate, State, model_with, status_of
-from .kalman_filter import KalmanFilter, Noise
+from .kalman_filter import AHEAD, KalmanFilter, Noise
 from .recursive import OnlineIdentifier
 
 __all__ = ["KalmanIdentifier"]
@@ -33,6 +35,7 @@ _FACTORS = (0.2, 0.45, 2.2, 5.0)
 _DETERMINED = 0.05  # relative standard error at which a linear parameter is near enough, of the largest force for a force
 _WIDER = 5.0  # start deviations beside the standard errors of least squares
 _LEAST_RELATIVE = 0.02
+_LOUD = (10.0, 3.0)  # times the noise of the force, in passes over the start that lead towards the values
 _NONLINEAR = 0.5  # relative start deviation of what least squares can't tell
 _LEAST = 1.5  # [s] of motion before that
 _PATIENCE = 5.0  # [s] of motion after which the filter begins with what there is
@@ -210,8 +213,7 @@ class KalmanIdentifier:
                 deviations[k] = max(min(_WIDER * errors[name], largest[k]), _LEAST_RELATIVE * abs(values[k]))
             elif values[k] == lower[k] == 0.0:
                 deviations[k] = max(forces, default=1.0)
-        noise = self._noise()
-        self._band = _REST_STEPS * math.sqrt(12.0) * noise.position
+        noise, self._band = self._noise()
         tried = self._samples[-_TRIED:]
         best, likeliest = begun, -math.inf
         nonlinear = [int(k) for k, name in zip(free.index, free.names, strict=True) if name not in errors]
@@ -222,42 +224,55 @@ class KalmanIdentifier:
                 changed[k] *= factor
                 trials.append(begun.with_values(changed))
         for trial in trials if len(trials) > 1 else []:
-            likelihood = self._likelihood(trial, deviations, noise, tried)
+            likelihood, _ = self._passed(trial, deviations, noise, tried)
             if likelihood > likeliest:
                 best, likeliest = trial, likelihood
-        scale = np.where(values != 0.0, best.values[free.index] / np.where(values != 0.0, values, 1.0), 1.0)
-        self._filter = self._filter_from(best, deviations * np.abs(scale), noise, self._first_position, self._samples[0])
+        for louder in _LOUD:
+            _, best = self._passed(
+                best, deviations * _beside(best, begun, free), replace(noise, force=louder * noise.force), self._samples
+            )
+        self._filter = self._filter_from(
+            best, deviations * _beside(best, begun, free), noise, self._first_position, self._samples[0]
+        )
         for duration, force, position in self._samples:
             self._follow(duration, force, position)
         self._samples = []
 
     def _filter_from(
-        self, model: Model, deviations: Array, noise: Noise, position: float, first: tuple[float, float, float]
+        self,
+        model: Model,
+        deviations: Array,
+        noise: Noise,
+        position: float,
+        first: tuple[float, float, float],
+        ahead: int = AHEAD,
     ) -> KalmanFilter:
         duration, force, after = first
         motion = (position, (after - position) / duration, force)
-        return KalmanFilter(model, self._free, deviations, noise, self.kind, self.forgetting_time, motion)
+        return KalmanFilter(model, self._free, deviations, noise, self.kind, self.forgetting_time, motion, ahead)
 
-    def _likelihood(self, model: Model, deviations: Array, noise: Noise, samples: list[tuple[float, float, float]]) -> float:
-        """Logarithm of the likelihood of ``samples`` with ``model`` as the start, but for a constant."""
-        tried = self._filter_from(model, deviations, noise, samples[0][2], samples[1])
+    def _passed(
+        self, model: Model, deviations: Array, noise: Noise, samples: list[tuple[float, float, float]]
+    ) -> tuple[float, Model]:
+        """Logarithm of the likelihood of ``samples`` with ``model`` as the start, but for a constant, and where it leads."""
+        # Only to come near: what the next samples tell would take twice the time.
+        tried = self._filter_from(model, deviations, noise, samples[0][2], samples[1], 0)
         total = 0.0
         for duration, force, position in samples[1:]:
             tried.step(duration, force, position, False)
-            total -= 0.5 * (min(tried.innovation / tried.deviation, 10.0) ** 2 + min(tried.surprise**2, 100.0))
-            total -= math.log(tried.deviation)
-        return total if math.isfinite(total) else -math.inf
+            total -= 0.5 * min(tried.surprise**2, 100.0) + math.log(tried.deviation)
+        return (total, tried.model()) if math.isfinite(total) and np.all(np.isfinite(tried.mean)) else (-math.inf, model)
 
-    def _noise(self) -> Noise:
-        """Of the signals, from what has been recorded so far."""
+    def _noise(self) -> tuple[Noise, float]:
+        """Of the signals, from what has been recorded so far, and the band within which a position rests [x]."""
         _, forces, positions = np.array(self._samples).T
         steps = np.abs(np.diff(positions))
         moved = steps[steps > 1e-12 * max(float(np.ptp(positions)), 1e-300)]
         resolution = float(np.min(moved)) if moved.size else 0.0
-        position = max(noise_of(positions), resolution / math.sqrt(12.0), 1e-9 * float(np.ptp(positions)))
+        white = max(noise_of(positions), 1e-9 * float(np.ptp(positions)))
         force = max(noise_of(forces), 1e-3 * float(np.std(forces)))
-        change = math.sqrt(max(float(np.mean(np.diff(forces) ** 2)) - 2.0 * force * force, force * force))
-        return Noise(position, force, change)
+        # Where it creeps, what rounding does stays the same for a while: it counts with all it can be.
+        return Noise(max(white, 0.5 * resolution), force), _REST_STEPS * max(math.sqrt(12.0) * white, resolution)
 
     def _follow(self, duration: float, force: float, position: float) -> None:
         """One sample through the filter."""
@@ -347,3 +362,9 @@ class KalmanIdentifier:
     def model(self) -> Model:
         """The structure with the values estimated so far and their standard errors."""
         return model_with(self.structure, self.estimate())
+
+
+def _beside(model: Model, other: Model, free: FreeParameters) -> Array:
+    """Ratio of the free values of two models, 1 for those that are 0 in the other."""
+    values, beside = model.values[free.index], other.values[free.index]
+    return np.where(beside != 0.0, np.abs(values) / np.where(beside != 0.0, np.abs(beside), 1.0), 1.0)

@@ -4,14 +4,15 @@ The model itself is the process: from one sample to the next it is led by its co
 (:mod:`fric_nodes.identification.online.loops`). What isn't known of the force goes through the model like the force itself,
 so that a contact that sticks isn't shaken by it. What is measured is the position, and the force.
 
-Extended: slopes over one standard deviation to either side, wide enough to reach over the kinks of friction; what they
-leave out, the curvature, counts as noise. With a derivative at a point the filter is certain of a contact that sticks, and
-lost when it slips. Unscented: points at sqrt(3) standard deviations, where a normal distribution has its fourth moment.
+Extended: slopes over one standard deviation to either side, wide enough to reach over the kinks of friction. With a derivative
+at a point the filter is certain of a contact that sticks, and lost when it slips. Unscented: points at sqrt(3) standard
+deviations, where a normal distribution has its fourth moment. What slopes leave out counts as noise.
 
-The force itself is a state, since as an input its noise would be in the slopes of the parameters, which then come out too
-small beside a mass that is too large: a regressor with noise in it. So the force is expected where it was, give or take
-what it has changed by of late; the measured position tells, through the model, which force acted; and then the recorded one
-is compared with that. The slopes hold noise of the past only.
+The recorded force is the last state: what acted is that, give or take its noise. Slopes at the recorded force, and at a motion
+that follows from it, hold this noise, and a regressor with noise in it makes its parameter too small. So each interval is led
+several times: first to learn, from its end and those of the next intervals, at which motion it began and which force acted;
+then with the slopes there, along what that leaves unknown, referred back to what was known before. That is an iterated filter
+with a lag; the estimate is as many samples late.
 
 An innovation beyond four standard deviations is put down to a kick of the motion (a reversal that came a little earlier, a
 knock), so that it moves the state and hardly the parameters. Force residuals larger than the noise of the start raise it.
@@ -26,12 +27,14 @@ others old information gives way to new along the direction of each sample, and 
 1987), which is a process noise that is there only with news.
 
 Source: Julier and Uhlmann 2004 (unscented transform); van der Merwe and Wan 2001 (its square root); Schmidt 1966 (what is
-not estimated is considered); Kulhavy 1987 (directional forgetting).
+not estimated is considered); Bell and Cathey 1993 (iterated filter); Garcia-Fernandez and others 2015 (points around what is
+known afterwards); Kulhavy 1987 (directional forgetting).
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,15 +43,16 @@ from ...model import Model
 from ...record import Array, Mask
 from ...simulate import substeps
 from ..free_parameters import FreeParameters
-from .loops import collapse, correct, scatter
+from .loops import carry, collapse, correct, scatter, tell
 
-__all__ = ["KalmanFilter", "Noise"]
+__all__ = ["AHEAD", "KalmanFilter", "Noise"]
+
+AHEAD = 3
+"""Samples that tell about the beginning of an interval, beside that at its end."""
 
 _WIDTHS = {"ekf": 1.0, "ukf": math.sqrt(3.0)}
 _STEP_OF_RATE = 0.15  # as in prediction error: from one sample to the next its error is far below any noise
 _LIMIT = 4.0  # standard deviations of an innovation beyond which it isn't noise
-_CHANGE_TIME = 0.2  # [s] over which the force's changes are looked at
-_CHANGE_WIDTH = 3.0  # of what it is allowed, beside those: at reversals it changes by far more than on average
 _SMOOTH_TIME = 0.02  # [s] of steady news: the noise in them is quicker
 _TELLING = 0.3  # of a parameter's size: standard error from the news alone above which it isn't seen
 _NEWS_TIME = 2.0  # [s] over which information counts as new
@@ -58,13 +62,15 @@ _LOG_LIMIT = 2.3  # largest standard deviation of a logarithm: a factor of ten
 _LOUDER = 0.05  # how fast the force noise follows what is found of it, per look
 
 
+_Sample = tuple[float, float, float, bool]
+
+
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: of the position [x] and force signals [F], and of the force's change between samples [F]."""
+    """Standard deviations of the position [x] and force signals [F]."""
 
     position: float
     force: float
-    change: float
 
 
 class KalmanFilter:
@@ -78,6 +84,7 @@ class KalmanFilter:
         kind: ``ekf`` or ``ukf``.
         forgetting_time: how long information counts [s].
         motion: position [x], velocity [x/s] and force [F] at the start.
+        ahead: samples that tell about the beginning of an interval, beside that at its end.
 
     Attributes:
         mean: parameters (or their logarithms), plant states, slip states, shape ``(n,)``.
@@ -96,8 +103,10 @@ class KalmanFilter:
         kind: str,
         forgetting_time: float,
         motion: tuple[float, float, float],
+        ahead: int = AHEAD,
     ) -> None:
         position, velocity, force = motion
+        self._n_ahead = ahead
         self._model, self._free, self._noise, self._forgetting_time = model, free, noise, forgetting_time
         self._unscented, self._width = kind == "ukf", _WIDTHS[kind]
         self._base = model.values
@@ -116,7 +125,7 @@ class KalmanFilter:
         self.mean = np.concatenate([theta, states, slips[:n_z], [force]])
         self.root = np.zeros((n, n))
         seen, rate = (n_theta + k for k in model.plant.encoder)
-        self._seen_state, self._rate_state, self._duration = seen, rate, 1.0
+        self._seen_state, self._rate_state = seen, rate
         self.root[np.diag_indices(n_theta)] = spread
         self._most = spread.copy()
         self._force_noise = noise.force
@@ -132,10 +141,13 @@ class KalmanFilter:
         self._constants = np.zeros(sum(held.effect.constants(held.values) for held in model.terms))
         self._work, self._gain, self._out = np.empty((n, 3 * n + 5)), np.empty(n), np.zeros(3)
         self._around = np.array([0.0, 1.0, 0.0])
-        self._news, self._smooth = np.zeros((n_theta, n_theta)), np.zeros((2, n_theta))
+        self._news, self._smooth = np.zeros((n_theta, n_theta)), np.zeros(n_theta)
         self._held = np.zeros(n_theta)
         self._since = self._age = 0.0
         self._n_substeps, self._step = 1, -1.0
+        self._shift, self._plain, self._columns = np.zeros(n), np.eye(n), np.zeros((n, n))
+        self._narrow, self._widen = np.eye(n), np.eye(n)
+        self._ahead: deque[_Sample] = deque()
         self.innovation, self.deviation, self.residual, self.surprise = 0.0, 1.0, 0.0, 0.0
         self.seen: Mask = np.ones(n_theta, dtype=np.bool_)
         self.set_moving(position, velocity, force)
@@ -151,6 +163,7 @@ class KalmanFilter:
             velocity: [x/s].
             force: [F].
         """
+        self._ahead.clear()
         n_theta, n = self._n_theta, self.mean.shape[0]
         model = self.model()
         slips, memory = model.inner_states()
@@ -166,7 +179,6 @@ class KalmanFilter:
         self._news[:], self._smooth[:] = 0.0, 0.0
         self._held[:] = 1.0
         self.seen = np.zeros(n_theta, dtype=np.bool_)
-        self._before, self._square = force, self._noise.change**2 + 2.0 * self._noise.force**2
 
     def _level(self) -> float:
         """Deflection of slip states in the model's sliding, by its stiffest part [x]; for start values only."""
@@ -208,37 +220,31 @@ class KalmanFilter:
             position: measured [x].
             resting: True when the joint rests, so that nothing is to be learnt.
         """
+        self._ahead.append((duration, force, position, resting))
+        if len(self._ahead) > self._n_ahead:
+            self._take(self._ahead.popleft())
+
+    def _take(self, sample: _Sample) -> None:
+        """Lead the filter over one interval and correct it; those that follow tell more about its beginning."""
+        duration, force, position, resting = sample
         if abs(duration - self._step) > 0.01 * self._step:
             self._step = duration
             self._n_substeps = substeps(self.model(), duration, _STEP_OF_RATE)
-        self._duration = duration
-        slips = self._slips[:, : self._n_z]
-        scatter(
-            self.mean, self.root, self._width, self._change(force), self._base, self._free.index, self._is_log,
-            self._free.lower, self._free.upper, self._points, self._values, self._forces, self._states, slips, self._memories,
-        )  # fmt: skip
-        if self._led:
-            self._slips[1:] = self._slips[0]
-        self._model.loops.fan(
-            self._values, self._forces, duration, self._n_substeps, self._around, self._states, self._slips, self._memories,
-            self._friction, self._z_next, self._constants,
-        )  # fmt: skip
-        collapse(
-            self._points, self._states, slips, self._n_theta, self._width, self._unscented, self._floor, self.mean,
-            self._work, self.root,
-        )  # fmt: skip
-        self._around[0] += duration
         held = np.ones_like(self._held) if resting else self._held
         forgotten = 0.0
         if math.isfinite(self._forgetting_time):
             forgotten = min(self._n_theta * duration / self._forgetting_time, 0.5)
-        fade = math.exp(-duration / _NEWS_TIME)
-        # The position first: it tells, through the model, the force that acted; the recorded one is then compared with that.
-        self._correct(self._seen_state, self._rate_state, position, self._noise.position, held, 0.5 * forgotten, fade)
+        self._smooth_out(sample)
+        self._lead(duration, force)
+        self._around[0] += duration
+        fresh, fade = 1.0 - math.exp(-duration / _SMOOTH_TIME), math.exp(-duration / _NEWS_TIME)
+        correct(
+            self.mean, self.root, self._seen_state, self._rate_state, duration, self._n_theta, position, self._noise.position,
+            _LIMIT, held, forgotten, self._most, self._news, fade, self._smooth, fresh, self._work, self._gain, self._out,
+        )  # fmt: skip
         self.innovation, self.deviation = float(self._out[0]), float(self._out[1])
-        self._correct(self.mean.shape[0] - 1, -1, force, self._force_noise, held, 0.5 * forgotten, 1.0)
-        self.residual = float(self._out[0])
-        self.surprise = self.residual / float(self._out[1])
+        self.residual = force - float(self.mean[-1])
+        self.surprise = -self.innovation / self.deviation
         self._loudness += (1.0 - math.exp(-duration / _NEWS_TIME)) * (min(self.surprise**2, _LIMIT**2) - self._loudness)
         self._age += duration
         self._since += duration
@@ -252,22 +258,44 @@ class KalmanFilter:
         """True when the last sample was put down to a kick."""
         return abs(self.innovation) > _LIMIT * self.deviation
 
-    def _change(self, force: float) -> float:
-        """Standard deviation of the force's change since the last interval [F]: as its changes of late were, beyond noise."""
-        noise = self._force_noise
-        self._square += (1.0 - math.exp(-self._duration / _CHANGE_TIME)) * ((force - self._before) ** 2 - self._square)
-        self._before = force
-        change = _CHANGE_WIDTH * math.sqrt(max(self._square - 2.0 * noise * noise, (0.1 * noise) ** 2))
-        jump = abs(force - float(self.mean[-1]))
-        return jump if jump > 3.0 * math.hypot(change, noise) else change
+    def _smooth_out(self, sample: _Sample) -> None:
+        """What the ends of this interval and of those that follow tell about its beginning."""
+        begun = self.mean.copy(), self.root.copy(), self._slips[0].copy(), self._memories[0].copy()
+        self._shift[:], self._narrow[:], self._widen[:] = 0.0, self._plain, self._plain
+        shift, narrow, widen = np.zeros_like(self._shift), self._plain.copy(), self._plain.copy()
+        columns = self._columns
+        for number, (duration, force, position, _) in enumerate((sample, *self._ahead)):
+            before = self.root.copy()
+            self._lead(duration, force)
+            if number == 0:
+                columns = self._columns.copy()
+            else:
+                carry(columns, before, self._columns, self._work)
+            if not tell(
+                self.mean, self.root, self._seen_state, position, self._noise.position, _LIMIT, columns, shift, narrow, widen,
+                self._work,
+            ):  # fmt: skip
+                break
+        self._shift, self._narrow, self._widen = shift, narrow, widen
+        self.mean[:], self.root[:], self._slips[0], self._memories[0] = begun
 
-    def _correct(
-        self, state: int, rate: int, measured: float, noise: float, held: Array, forgotten: float, fade: float
-    ) -> None:
-        fresh = 1.0 - math.exp(-self._duration / _SMOOTH_TIME)
-        correct(
-            self.mean, self.root, state, rate, self._duration, self._n_theta, measured, noise, _LIMIT, held, forgotten,
-            self._most, self._news, fade, self._smooth[int(rate < 0)], fresh, self._work, self._gain, self._out,
+    def _lead(self, duration: float, force: float) -> None:
+        """Lead mean and root over an interval, with slopes around what is known of its beginning from later."""
+        slips = self._slips[:, : self._n_z]
+        scatter(
+            self.mean, self.root, self._width, force, self._force_noise, self._shift, self._narrow, self._base,
+            self._free.index, self._is_log, self._free.lower, self._free.upper, self._points, self._values, self._forces,
+            self._states, slips, self._memories,
+        )  # fmt: skip
+        if self._led:
+            self._slips[1:] = self._slips[0]
+        self._model.loops.fan(
+            self._values, self._forces, duration, self._n_substeps, self._around, self._states, self._slips, self._memories,
+            self._friction, self._z_next, self._constants,
+        )  # fmt: skip
+        collapse(
+            self._points, self._states, slips, self._n_theta, self._width, self._unscented, self._shift, self._widen,
+            self._columns, self._floor, self.mean, self._work, self.root,
         )  # fmt: skip
 
     def _schedule(self) -> None:

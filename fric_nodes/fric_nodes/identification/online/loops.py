@@ -19,21 +19,27 @@ from typing import Any
 
 from ...engine.kernel import kernel, loop
 
-__all__ = ["collapse", "correct", "scatter"]
+__all__ = ["carry", "collapse", "correct", "scatter", "tell"]
 
 
 @loop
 def scatter(
-    mean: Any, root: Any, width: float, change: float, base: Any, index: Any, is_log: Any, lower: Any, upper: Any,
-    points: Any, values: Any, forces: Any, states: Any, slips: Any, memories: Any,
+    mean: Any, root: Any, width: float, force: float, noise: float, shift: Any, narrow: Any, base: Any, index: Any, is_log: Any,
+    lower: Any, upper: Any, points: Any, values: Any, forces: Any, states: Any, slips: Any, memories: Any,
 ) -> None:  # fmt: skip
-    """Points around the mean: itself, and one on either side along each column of the root; the force may have changed.
+    """Points around the mean: itself, and one on either side along each column of the root; the force is another each time.
+
+    They may lie around another point, what later samples say about the beginning of the interval, along the columns of a root
+    of what that leaves unknown.
 
     Args:
         mean: shape ``(n,)``.
         root: shape ``(n, n)``.
         width: distance of the points [standard deviations].
-        change: of the force from one interval to the next, standard deviation [F].
+        force: recorded over the interval, the last state [F].
+        noise: its standard deviation [F].
+        shift: to that point, along the columns of the root, shape ``(n,)``.
+        narrow: the other root is the root times this, shape ``(n, n)``.
         base: all values of the model, shape ``(n_parameters,)``.
         index: which of them are estimated, shape ``(n_theta,)``.
         is_log: not 0 where the state is the logarithm of the value.
@@ -48,19 +54,26 @@ def scatter(
     """
     n = mean.shape[0]
     n_theta, n_x, n_z = index.shape[0], states.shape[1], slips.shape[1]
-    # The force is the last state: a change that comes from nothing else only enters its own corner.
-    root[n - 1, n - 1] = math.sqrt(root[n - 1, n - 1] ** 2 + change * change)
+    # What acted over earlier intervals is in the motion, and says nothing about what acts over this one.
+    mean[n - 1] = force
+    for k in range(n - 1):
+        root[n - 1, k] = 0.0
+    root[n - 1, n - 1] = noise
+    for k in range(n):
+        middle = mean[k]
+        for j in range(k + 1):
+            middle += root[k, j] * shift[j]
+        points[0, k] = middle
+        for j in range(n):
+            step = 0.0
+            for i in range(k + 1):
+                step += root[k, i] * narrow[i, j]
+            points[1 + j, k] = middle + width * step
+            points[1 + n + j, k] = middle - width * step
     for i in range(points.shape[0]):
-        for k in range(n):
-            points[i, k] = mean[k]
         if i > 0:
             for k in range(memories.shape[1]):
                 memories[i, k] = memories[0, k]
-    for j in range(n):
-        for k in range(j, n):
-            points[1 + j, k] += width * root[k, j]
-            points[1 + n + j, k] -= width * root[k, j]
-    for i in range(points.shape[0]):
         forces[i] = points[i, n - 1]
         for k in range(base.shape[0]):
             values[i, k] = base[k]
@@ -77,21 +90,15 @@ def scatter(
 
 @loop
 def collapse(
-    points: Any,
-    states: Any,
-    slips: Any,
-    n_theta: int,
-    width: float,
-    unscented: bool,
-    floor: Any,
-    mean: Any,
-    work: Any,
-    root: Any,
-) -> None:
-    """Mean and root of what has become of the points.
+    points: Any, states: Any, slips: Any, n_theta: int, width: float, unscented: bool, shift: Any, widen: Any, columns: Any,
+    floor: Any, mean: Any, work: Any, root: Any,
+) -> None:  # fmt: skip
+    """Mean and root of what has become of the points, led back from the other point to the mean.
 
-    Extended: the mean point, and the slopes between the points on either side. Unscented: weighted mean and deviations, with
-    the weights of the scaled transform; that of the middle is kept from going below zero in the covariance.
+    The mean is that of the middle point. The point around which they lie is an estimate already, which scatters around what
+    was: what a curved model makes of that scatter is in the innovations, and to put it into the mean too would count it twice.
+    What the slopes leave out is noise: for the extended filter the curvature at the middle, for the unscented one the points'
+    own deviation with their weights.
 
     Args:
         points: from :func:`scatter`; their states are taken from ``states`` and ``slips``.
@@ -100,51 +107,146 @@ def collapse(
         n_theta: number of parameters.
         width: of the points.
         unscented: which of the two.
+        shift: as in :func:`scatter`.
+        widen: inverse of ``narrow`` there.
+        columns: written, what the columns of the root have become, ``(n, n)``.
         floor: standard deviation that a step adds to each state, shape ``(n,)``.
         mean: written, shape ``(n,)``.
         work: work space, shape ``(n, 3 n + 5)``.
         root: written, shape ``(n, n)``.
     """
     n, n_x, n_z = mean.shape[0], states.shape[1], slips.shape[1]
-    m = points.shape[0]
-    for i in range(m):
+    for i in range(points.shape[0]):
         for k in range(n_x):
             points[i, n_theta + k] = states[i, k]
         for k in range(n_z):
             points[i, n_theta + n_x + k] = slips[i, k]
-    columns = 0
-    if unscented:
-        spread = width * width
-        weight = 0.5 / spread
-        middle = 1.0 - (m - 1) * weight
-        # Of the scaled transform with alpha^2 = width^2/n and beta = 2.
-        middle_square = math.sqrt(max(middle + 3.0 - spread / n, 0.0))
-        side = math.sqrt(weight)
-        for k in range(n):
-            total = 0.0
-            for i in range(1, m):
-                total += points[i, k] - points[0, k]
-            mean[k] = points[0, k] + weight * total
-            for i in range(1, m):
-                work[k, i - 1] = side * (points[i, k] - mean[k])
-            work[k, m - 1] = middle_square * (points[0, k] - mean[k])
-        columns = m
-    else:
-        half = 0.5 / width
-        for k in range(n):
-            mean[k] = points[0, k]
-            for j in range(n):
-                work[k, j] = half * (points[1 + j, k] - points[1 + n + j, k])
-                # Of a slope that isn't constant, s + c x: the variance of c x^2/2 comes to c^2/2.
-                work[k, n + j] = (
-                    2.0 * math.sqrt(2.0) * half * half * (points[1 + j, k] - 2.0 * points[0, k] + points[1 + n + j, k])
-                )
-        columns = 2 * n
+    half = 0.5 / width
+    # Of a slope that isn't constant, s + c x: the variance of c x^2/2 comes to c^2/2.
+    bend = half if unscented else 2.0 * math.sqrt(2.0) * half * half
+    for k in range(n):
+        back = 0.0
+        for j in range(n):
+            work[k, n + j] = bend * (points[1 + j, k] - 2.0 * points[0, k] + points[1 + n + j, k])
+            slope = 0.0
+            for i in range(n):
+                slope += half * (points[1 + i, k] - points[1 + n + i, k]) * widen[i, j]
+            work[k, j] = columns[k, j] = slope
+            back += slope * shift[j]
+        mean[k] = points[0, k] - back
+    n_columns = 2 * n
     for j in range(n_theta, n - 1):
         for k in range(n):
-            work[k, columns] = floor[j] if k == j else 0.0
-        columns += 1
-    triangular(work, columns, root)
+            work[k, n_columns] = floor[j] if k == j else 0.0
+        n_columns += 1
+    triangular(work, n_columns, root)
+
+
+@loop
+def tell(
+    mean: Any, root: Any, seen: int, y: float, noise: float, limit: float, columns: Any, shift: Any, narrow: Any, widen: Any,
+    work: Any,
+) -> bool:  # fmt: skip
+    """What the measured state at the end of an interval says about its beginning, and mean and root at its end with that.
+
+    Args:
+        mean: predicted, shape ``(n,)``; corrected in place, as is the root.
+        root: shape ``(n, n)``.
+        seen: which state is measured.
+        y: its measured value.
+        noise: its standard deviation.
+        limit: of an innovation [standard deviations]; beyond it nothing is said, and False handed back.
+        columns: what the columns of the root at the beginning have become, shape ``(n, n)``; corrected in place.
+        shift: led on, as in :func:`scatter`.
+        narrow: led on, as in :func:`scatter`.
+        widen: led on, as in :func:`collapse`.
+        work: work space, shape ``(n, 3 n + 5)``.
+    """
+    n = mean.shape[0]
+    variance = noise * noise
+    for j in range(seen + 1):
+        variance += root[seen, j] * root[seen, j]
+    deviation = math.sqrt(variance)
+    innovation = (y - mean[seen]) / deviation
+    if abs(innovation) > limit:
+        return False
+    at = n + 1
+    for j in range(n):
+        work[j, at] = columns[seen, j] / deviation
+    for k in range(n):
+        gain = 0.0
+        for j in range(min(k, seen) + 1):
+            gain += root[k, j] * root[seen, j]
+        gain /= deviation
+        mean[k] += gain * innovation
+        for j in range(n):
+            columns[k, j] -= gain * work[j, at]
+            work[k, j] = root[k, j] - gain / deviation * root[seen, j]
+        work[k, n] = gain / deviation * noise
+    triangular(work, n + 1, root)
+    told(innovation, shift, narrow, widen, work)
+    return True
+
+
+@loop
+def carry(columns: Any, begun: Any, later: Any, work: Any) -> None:
+    """What has become of the columns of an earlier root at the end of an interval.
+
+    Args:
+        columns: what they were at its beginning, shape ``(n, n)``; led on in place.
+        begun: root at its beginning, shape ``(n, n)``.
+        later: what the columns of that have become, shape ``(n, n)``.
+        work: work space, shape ``(n, 3 n + 5)``.
+    """
+    n = begun.shape[0]
+    # Along the columns of the root, by forward substitution; the force is another, of which nothing was known.
+    for j in range(n):
+        for k in range(n - 1):
+            total = columns[k, j]
+            for i in range(k):
+                total -= begun[k, i] * work[i, j]
+            work[k, j] = total / begun[k, k] if begun[k, k] > 0.0 else 0.0
+    for k in range(n):
+        for j in range(n):
+            total = 0.0
+            for i in range(n - 1):
+                total += later[k, i] * work[i, j]
+            columns[k, j] = total
+
+
+@kernel
+def told(innovation: float, shift: Any, narrow: Any, widen: Any, work: Any) -> None:
+    """Take in an innovation of deviation 1 whose slopes along the columns of the root are in ``work[:, n + 1]``.
+
+    With T the ``narrow`` so far, what is left is T T' - d d' = T (I - b b') T' with b = T^-1 d, and I - b b' is the square of
+    I - g b b'.
+    """
+    n = shift.shape[0]
+    at, turned = n + 1, n + 2
+    square = 0.0
+    for i in range(n):
+        shift[i] += work[i, at] * innovation
+        work[i, turned] = 0.0
+        for j in range(n):
+            work[i, turned] += widen[i, j] * work[j, at]
+        square += work[i, turned] * work[i, turned]
+    square = min(square, 1.0 - 1e-12)
+    if square <= 0.0:
+        return
+    less = (1.0 - math.sqrt(1.0 - square)) / square
+    more = less / (1.0 - less * square)
+    for i in range(n):
+        along = 0.0
+        for j in range(n):
+            along += narrow[i, j] * work[j, turned]
+        for j in range(n):
+            narrow[i, j] -= less * along * work[j, turned]
+    for j in range(n):
+        along = 0.0
+        for i in range(n):
+            along += work[i, turned] * widen[i, j]
+        for i in range(n):
+            widen[i, j] += more * work[i, turned] * along
 
 
 @kernel

@@ -31,9 +31,10 @@ import numpy as np
 
 from ...model import Model
 from ...record import Array, Mask, Record, RecordError
-from ..equations import Equations, at_rest, equations
+from ..equations import Equations, equations
 from ..free_parameters import FreeParameters
 from ..inverse_dynamics import regressors
+from ..rests import SLOW, Rests, at_rest, can_stand_for
 from ..result import IdentificationError, Options
 from ..scoring import driving_force
 from .estimate import Estimate, State, model_with, status_of
@@ -43,7 +44,6 @@ __all__ = ["OnlineIdentifier"]
 _BLOCK_TIME = 0.5  # [s]
 _MIN_BLOCKS_PER_PARAMETER = 3
 _MOST_FORGOTTEN = 0.9  # of the information along one row, by that row
-_REST = 0.02  # of the fastest motion, as offline
 _GROWN = 1.02  # growth of the rest limit from which the blocks kept are judged anew
 _BLOCKS_KEPT = 240
 _CHANGED = 9.0  # what other values would explain of a block's residuals, beside what they usually would
@@ -54,16 +54,28 @@ _OLD = 0.05  # of a block: what old information counts after a change
 _ROWS_PER_PARAMETER = 20  # behind what is called usual
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Block:
-    """The equations of one block: rows ``(n, n_parameters)``, the rest of shape ``(n,)``, and the two sample times [s]."""
+    """The equations of one block: rows ``(n, n_parameters)``, the rest of shape ``(n,)``, and the two sample times [s].
+
+    Whether it rests in a row is judged beside the motion of all blocks kept, not of its own: ``sliding`` rows aren't at rest,
+    and into ``clear`` ones no rest reaches.
+    """
 
     rows: Array
     target: Array
     velocity: Array
-    sliding: Mask
+    rests: Rests
     row_time: float
     sample_time: float
+    sliding: Mask
+    clear: Mask
+
+    def judge(self, rest: float) -> None:
+        """Say where it rests, when that is slower than ``rest`` [x/s] for a while."""
+        limit = max(rest, self.rests.noise)
+        self.sliding = ~at_rest(self.velocity, limit, self.row_time)
+        self.clear = self.sliding & self.rests.clear(limit)
 
 
 class OnlineIdentifier:
@@ -94,7 +106,7 @@ class OnlineIdentifier:
         self._values = self.structure.values[self._free.index]
         self._forget(n)
         self._blocks: deque[_Block] = deque(maxlen=_BLOCKS_KEPT)
-        self._rest = 0.0
+        self._rest, self._only_clear = 0.0, True
         self.samples_rejected = 0
         self._clear_buffer()
 
@@ -191,16 +203,23 @@ class OnlineIdentifier:
         held[self._free.index] = 0.0
         row_time = float(found.time[1] - found.time[0])
         force = driving_force(self.structure, found)
-        block = _Block(columns[:, self._free.index], force - columns @ held, found.velocity, found.clear, row_time, sample_time)
+        every = np.ones_like(found.sliding)
+        target = force - columns @ held
+        block = _Block(columns[:, self._free.index], target, found.velocity, found.rests, row_time, sample_time, every, every)
         self._blocks.append(block)
         rest = self._rest_limit()
-        if rest > _GROWN * self._rest:
+        anew = rest > _GROWN * self._rest
+        if anew:
             self._rest = rest
+        for judged in self._blocks if anew else (block,):
+            judged.judge(self._rest)
+        if anew or self._enough_is_clear() != self._only_clear:
+            self._only_clear = self._enough_is_clear()
             self._forget(len(self._free.names))
-            learnt = [self._learn_block(earlier, rest) for earlier in self._blocks]
+            learnt = [self._learn_block(earlier) for earlier in self._blocks]
         else:
-            learnt = [self._learn_block(block, rest)]
-        if not learnt[-1]:
+            learnt = [self._learn_block(block)]
+        if not np.any(block.sliding):
             # A long rest must not push out what tells how slow rest is.
             self._blocks.pop()
         return any(learnt)
@@ -209,14 +228,19 @@ class OnlineIdentifier:
         """Speed below which the joint may be at rest [x/s]: slow beside the fastest motion of the blocks kept."""
         if self.options.rest_velocity is not None:
             return self.options.rest_velocity
-        return _REST * float(np.quantile(np.abs(np.concatenate([block.velocity for block in self._blocks])), 0.98))
+        return SLOW * float(np.quantile(np.abs(np.concatenate([block.velocity for block in self._blocks])), 0.98))
 
-    def _learn_block(self, block: _Block, rest: float) -> bool:
-        """Learn from the rows of ``block`` that are not slower than ``rest`` for a while."""
+    def _enough_is_clear(self) -> bool:
+        """Whether rows that no rest reaches into can stand for all in which the joint slides."""
+        clear, sliding = (np.concatenate(masks) for masks in zip(*((b.clear, b.sliding) for b in self._blocks), strict=True))
+        return can_stand_for(clear, sliding, np.concatenate([block.velocity for block in self._blocks]))
+
+    def _learn_block(self, block: _Block) -> bool:
+        """Learn from the rows of ``block`` in which the joint slides."""
         forgetting = math.exp(-block.row_time / self.forgetting_time) if math.isfinite(self.forgetting_time) else 1.0
         score = np.zeros(block.rows.shape[1])
         n_learnt = 0
-        sliding = block.sliding & ~at_rest(block.velocity, rest, block.row_time)
+        sliding = block.clear if self._only_clear else block.sliding
         self._look_for_change(block.rows[sliding], block.target[sliding])
         for phi, force in zip(block.rows[sliding], block.target[sliding], strict=True):
             if float(phi @ phi) > 0.0:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy import signal
 
 from ...record import Array, Index, Record
+from ..oscillation_effort import at_stamps
 from ..result import IdentificationError
 from .feedback import Feedback, acting
 
@@ -123,7 +124,7 @@ def find_oscillation(record: Record, gains: tuple[float, float] | None = None, m
         IdentificationError: there is none, or it can't be analysed; says what to record instead.
     """
     notes = [*record.notes]
-    even = record.uniform()
+    even = at_stamps(record).uniform()
     first, last = _longest_valid(even)
     if last - first < even.n_samples:
         notes.append(f"{(even.n_samples - last + first) * even.sample_time:.2f} s outside the longest valid part left out")
