@@ -9,7 +9,6 @@ to start: which of many values of a candidate promise most, and from which value
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,44 +16,12 @@ from ..identification.gauss_newton import minimise
 from ..model import Model, Term
 from ..plants import PLANTS
 from ..record import Array
-from ..simulate import respond
 from .track import Track
-from .twin import smooth
-from .universe import universe_of
 
-__all__ = ["Along", "Motion", "motions"]
+__all__ = ["Along"]
 
-_SMOOTH = 4.0  # times the observer's bandwidth: of the motion
 _REST = 0.01  # of the fast speed, below which the body may rest
 _ITERATIONS = 5
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """The measured motion of one run, smoothed, in the middle of each interval.
-
-    Attributes:
-        position: [x], shape ``(n,)`` as the next two.
-        velocity: [x/s].
-        acceleration: [x/s^2].
-        step: between them [s].
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    step: float
-
-
-def motions(track: Track) -> list[Motion]:
-    """The smoothed motion of each run."""
-    found = []
-    for run in track.runs:
-        step = run.sample_time
-        position = smooth(np.concatenate([[run.start[0]], run.position]), step, _SMOOTH * track.bandwidth)
-        velocity = np.diff(position) / step
-        found.append(Motion(0.5 * (position[1:] + position[:-1]), velocity, np.gradient(velocity, step), step))
-    return found
 
 
 class Along:
@@ -64,17 +31,14 @@ class Along:
         track: the recordings.
 
     Attributes:
-        motion: of each run.
         moving: rows of the observer's signals in which the axis moves, shape ``(n,)``.
     """
 
     def __init__(self, track: Track) -> None:
         self._track = track
-        self._path: tuple[object, list[Array]] | None = None
-        self.motion = motions(track)
-        speed = np.abs(np.concatenate([each.velocity for each in self.motion]))
+        speed = np.abs(np.concatenate([each.velocity for each in track.motion]))
         rest = max(_REST * float(np.quantile(speed, 0.98)), 4.0 * max(track.noise) * track.bandwidth)
-        self.moving = track.joined([(np.abs(each.velocity) > rest).astype(np.float64) for each in self.motion]) > 0.5
+        self.moving = track.joined([(np.abs(each.velocity) > rest).astype(np.float64) for each in track.motion]) > 0.5
 
     def can(self, model: Model) -> bool:
         """True for models whose force the motion at the sensor tells."""
@@ -82,29 +46,7 @@ class Along:
 
     def residual(self, model: Model, extra: Term | None = None) -> Array:
         """The force that ``model``, with the term ``extra``, lacks [F], as the observer would see it, where the axis moves."""
-        universe = universe_of(model)
-        values = universe.values(model)
-        if extra is not None:
-            universe.put(values, extra)
-        track = self._track
-        found = []
-        for run, time, each in zip(track.runs, track.time, self.motion, strict=True):
-            effort, friction = np.empty_like(time), np.empty_like(time)
-            universe.loops.predict(
-                values, time - 0.5 * each.step, each.position, each.velocity, each.acceleration, each.step, run.load,
-                run.temperature, *universe.inner_states(model), effort, friction,
-            )  # fmt: skip
-            found.append(effort)
-        found = [a - b for a, b in zip(found, self._applied(model), strict=True)]
-        return np.nan_to_num(track.seen(found)[self.moving], nan=0.0, posinf=0.0, neginf=0.0)
-
-    def _applied(self, model: Model) -> list[Array]:
-        """What comes out of the command path of ``model`` [F], per run; that of the last model is kept."""
-        path = tuple((held.effect.key, held.values) for held in model.terms if held.effect.command is not None)
-        if self._path is None or self._path[0] != path:
-            runs = zip(self._track.runs, self.motion, strict=True)
-            self._path = path, [respond(model, run.effort, each.step) for run, each in runs]
-        return self._path[1]
+        return self._track.needed(model, None, extra)[self.moving]
 
     def fitted(self, model: Model, names: Sequence[str], scale: Array, bounds: Mapping[str, tuple[float, float]]) -> Model:
         """``model`` with the parameters ``names``, of the sizes ``scale``, such that it lacks least along the motion."""

@@ -22,8 +22,7 @@ from ..model import Model, Term
 from ..parameter import Parameter
 from ..plants import PLANTS
 from ..record import Array
-from .track import Track
-from .twin import smooth
+from .track import Track, smooth
 from .universe import worth_trying
 
 __all__ = ["Candidate", "Scales", "candidates", "scales_of"]

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..record import Array
-from .along import Motion, motions
 from .screen import Tried
-from .track import Fit, Track
+from .track import Fit, Motion, Track
 
 __all__ = ["Signature", "signatures"]
 
@@ -71,7 +70,7 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
     alone = _left(nominal, target)
     # A low-passed signal holds about so many independent numbers.
     independent = max(0.5 * track.bandwidth * float(sum(np.sum(run.step) for run in track.runs)), 50.0)
-    held = _Motions(motions(track), [run.effort for run in track.runs], track.time)
+    held = _Motions(track.motion, [run.effort for run in track.runs], track.time)
     found: dict[str, Signature] = {}
     for component, title, columns in _ways(track, held, missing):
         n = columns.shape[1]

@@ -18,8 +18,7 @@ import numpy as np
 from ..model import Model
 from ..record import Array, Mask
 from .candidates import Scales
-from .track import Track
-from .twin import smooth
+from .track import Track, smooth
 
 __all__ = ["Where", "locate"]
 

@@ -12,9 +12,12 @@ saves the model's own friction doesn't show as missing: the more friction a mode
 
     r = M beta e / h^2
 
-is the missing force, low-passed without loss at frequency zero by about two poles at w and late by 2/w. It is defined for every
-plant and every term (friction that sticks exactly, bristles, a body behind a gap, a lagging command), at rest as well as in
-motion, and needs no derivative of the measured position. The force that the model would have needed for the motion is u + r.
+is the missing force, low-passed without loss at frequency zero by about two poles at w and late by 2/w. It is defined for
+friction that sticks exactly, a body behind a gap and a lagging command, at rest as well as in motion, and needs no derivative
+of the measured position. The force that the model would have needed for the motion is u + r.
+
+Bristles are another matter: they may be far stiffer than M w^2, and impulses would ring on them. A model with slip dynamics is
+led by the alpha-beta filter itself, whose position is set, and r is reckoned with the model's own mass.
 Source: the gains are those of the alpha-beta filter in :mod:`fric_nodes.identification.innovations`; the rest is derived here.
 """
 
@@ -24,19 +27,22 @@ import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from ..identification.gauss_newton import Solution, minimise
 from ..identification.innovations import Run, noise_of, runs_of
-from ..model import Model
+from ..model import Model, Term
 from ..record import Array, Index, Mask, Record
-from ..simulate import substeps
+from ..simulate import respond, substeps
 from .universe import universe_of
 
-__all__ = ["Track", "Twin", "resolution"]
+__all__ = ["Motion", "Track", "Twin", "resolution", "smooth"]
 
+_SMOOTH = 4.0  # times the bandwidth: of the motion along which a force is needed
 _STEP_OF_RATE = 0.2
 _MOST_STEPS = 4  # per sample: the step is implicit, and what is faster than the observer changes nothing that it sees
 _SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
@@ -72,6 +78,23 @@ def resolution(position: Array) -> float:
     smallest = float(np.quantile(change, 0.02))
     counts = change / smallest
     return smallest if float(np.mean(np.abs(counts - np.round(counts)) < 0.05)) > 0.9 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The measured motion of one run, smoothed, in the middle of each interval.
+
+    Attributes:
+        position: [x], shape ``(n,)`` as the next two.
+        velocity: [x/s].
+        acceleration: [x/s^2].
+        step: between them [s].
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    step: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,23 +182,71 @@ class Track:
         values = universe.values(model)
         plant_values = np.array(model.plant_values)
         # The impulses are those of one mass, whatever mass the model has: a light model must not be led with less force.
-        heavier = self.mass / model.plant.total_inertia(*model.plant_values)
+        inertia = model.plant.total_inertia(*model.plant_values)
+        mass = inertia if model.has_slip_dynamics else self.mass
         parts = []
         for k, run in enumerate(self.runs):
             effort = run.effort if twin is None else twin.efforts[k]
             extra = _NOTHING if twin is None else twin.extras[k]
             position = run.position if twin is None else twin.positions[k]
             alpha, beta = self.gains(run)
-            gain = min(heavier, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
+            gain = min(mass / inertia, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
             state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k))
             found = np.empty(effort.shape[0])
             universe.loops.pursue(
                 values, effort, extra, position, run.step, self.n_substeps(model, run), run.load, run.temperature,
                 alpha, beta, gain, self.noise[k], state, *universe.inner_states(model), found,
             )  # fmt: skip
-            parts.append(self.mass * beta / run.sample_time**2 * found)
+            parts.append(mass * beta / run.sample_time**2 * found)
+        return self._finite(self.joined(parts))
+
+    def needed(self, model: Model, twin: Twin | None = None, extra: Term | None = None) -> Array:
+        """As :meth:`residual`, by the force that ``model``, with the term ``extra``, needs along the measured motion [F]."""
+        universe = universe_of(model)
+        values = universe.values(model)
+        if extra is not None:
+            universe.put(values, extra)
+        if twin is not None:
+            motion = motions(self, twin.positions, raw=model.has_slip_dynamics)
+        else:
+            motion = self.raw_motion if model.has_slip_dynamics else self.motion
+        found = []
+        for k, (run, time, each) in enumerate(zip(self.runs, self.time, motion, strict=True)):
+            effort, friction = np.empty_like(time), np.empty_like(time)
+            universe.loops.predict(
+                values, time - 0.5 * each.step, each.position, each.velocity, each.acceleration, each.step, run.load,
+                run.temperature, *universe.inner_states(model), effort, friction,
+            )  # fmt: skip
+            given = self._applied(model)[k] if twin is None else respond(model, twin.efforts[k], each.step) + twin.extras[k]
+            found.append(effort - given)
+        return self._finite(self.seen(found))
+
+    def _finite(self, signal: Array) -> Array:
+        """``signal`` without what no solver can use."""
         most = _LARGEST * max(float(np.ptp(run.effort)) for run in self.runs)
-        return np.clip(np.nan_to_num(self.joined(parts), nan=most, posinf=most, neginf=-most), -most, most)
+        return np.clip(np.nan_to_num(signal, nan=most, posinf=most, neginf=-most), -most, most)
+
+    @cached_property
+    def motion(self) -> tuple[Motion, ...]:
+        """The measured motion of each run."""
+        return motions(self, [run.position for run in self.runs])
+
+    @cached_property
+    def raw_motion(self) -> tuple[Motion, ...]:
+        """The measured motion of each run, as the encoder gives it: a filter would stretch bristles that are stiff."""
+        return motions(self, [run.position for run in self.runs], raw=True)
+
+    def _applied(self, model: Model) -> list[Array]:
+        """What comes out of the command path of ``model`` [F], per run; that of the last model is kept."""
+        path = tuple((held.effect.key, held.values) for held in model.terms if held.effect.command is not None)
+        if self._paths.get("path") != path:
+            runs = zip(self.runs, self.motion, strict=True)
+            self._paths.update(path=path, given=[respond(model, run.effort, each.step) for run, each in runs])
+        return self._paths["given"]  # type: ignore[no-any-return]
+
+    @cached_property
+    def _paths(self) -> dict[str, Any]:
+        return {}
 
     def begin(self, k: int) -> float:
         """Time in its recording at which run ``k`` begins [s]: a part must not take a slow drift for a new one."""
@@ -300,3 +371,25 @@ class Fit:
     def jacobian(self) -> Array:
         """Derivative of the residual, shape ``(n, n_free)``, per ``scale`` of each parameter."""
         return self.solution.jacobian
+
+
+def smooth(signal: Array, step: float, cutoff: float) -> Array:
+    """``signal`` without what is faster than ``cutoff`` [rad/s], without phase."""
+    edge = cutoff * step / math.pi
+    if edge >= 0.9:
+        return signal
+    result: Array = sosfiltfilt(butter(2, edge, output="sos"), signal)
+    return result
+
+
+def motions(track: Track, positions: Sequence[Array], *, raw: bool = False) -> tuple[Motion, ...]:
+    """The motion of each run of which ``positions`` were measured, smoothed unless it is to be ``raw``."""
+    found = []
+    for run, measured in zip(track.runs, positions, strict=True):
+        step = run.sample_time
+        position = np.concatenate([[run.start[0]], measured])
+        if not raw:
+            position = smooth(position, step, _SMOOTH * track.bandwidth)
+        velocity = np.diff(position) / step
+        found.append(Motion(0.5 * (position[1:] + position[:-1]), velocity, np.gradient(velocity, step), step))
+    return tuple(found)

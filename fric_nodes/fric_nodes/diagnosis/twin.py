@@ -12,27 +12,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from ..identification.innovations import Run, noise_of
 from ..model import Model
 from ..record import Array
-from .track import Track, Twin, resolution
+from .track import Track, Twin, resolution, smooth
 from .universe import universe_of
 
-__all__ = ["smooth", "twins"]
+__all__ = ["twins"]
 
 _SMOOTH = 4.0  # times the observer's bandwidth: of the motion that a twin is led along
 _LED = 4.0  # times the observer's bandwidth: of the spring that leads it; with a softer one a model sticks and slips
-
-
-def smooth(signal: Array, step: float, cutoff: float) -> Array:
-    """``signal`` without what is faster than ``cutoff`` [rad/s], without phase."""
-    edge = cutoff * step / math.pi
-    if edge >= 0.9:
-        return signal
-    result: Array = sosfiltfilt(butter(2, edge, output="sos"), signal)
-    return result
 
 
 def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:

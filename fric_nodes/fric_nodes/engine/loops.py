@@ -170,10 +170,12 @@ def pursue(
     ``behind[k]`` is how far the model is behind ``y[k]`` [x], for ``len(u)`` intervals of lengths ``h`` [s]. After each the
     velocity gets ``gain (beta e + alpha (e - e_before))/h``: with a ``gain`` of one, and were the model a mass alone, this is
     the alpha-beta filter of :func:`observe`, but the position is never set, so that every bit of the motion has been paid for
-    by a force, whatever the model's own friction is. A contact that sticks exactly is the exception: where the body
-    rests and is seen to rest it is put where it is seen, and left at rest while it is within three times ``noise`` [x] of it. Where the sensor sees a motor, the
-    load is carried along, unless it sticks. A run that is part of a recording gives, after its ``states``, the time at which
-    it begins [s]. ``extra`` holds a force that acts behind the command path besides, one value or ``(n,)`` [F].
+    by a force, whatever the model's own friction is. A contact that sticks exactly is the exception: where the body rests and
+    is seen to rest it is put where it is seen, and left at rest while it is within three times ``noise`` [x] of it. Bristles
+    are the other: an impulse would ring on them, and with a ``gain`` of one they get the alpha-beta filter itself. Where the
+    sensor sees a motor, the load is carried along, unless it sticks. ``extra`` is a force that acts behind the command path
+    besides, one value or ``(n,)`` [F]. A run that is part of a recording gives, after its ``states``, the time at which it
+    begins [s].
     """
     prepare(p, constants)
     p = unpacked(p)
@@ -193,9 +195,13 @@ def pursue(
             advance(p, x, x_next, s, command(u[k], h_sub, memory, p) + besides, h_sub, around)
         e = y[k] - x[SEEN]
         behind[k] = e
-        push = beta * e + alpha * (e - before)
+        push = beta * e + alpha * (e - before) if RIGID else beta * e
         before = e
-        if RIGID and x[SEEN_RATE] == 0.0 and (k == 0 or abs(y[k] - y[k - 1]) <= 3.0 * noise):
+        if not RIGID:
+            x[SEEN] += alpha * e
+            if SEEN != 0:
+                x[0] += alpha * e
+        elif x[SEEN_RATE] == 0.0 and (k == 0 or abs(y[k] - y[k - 1]) <= 3.0 * noise):
             for j in range(0, N_STATES, 2):
                 x[j] += alpha * e
             before = (1.0 - alpha) * e
