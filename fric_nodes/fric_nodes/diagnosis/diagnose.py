@@ -181,6 +181,10 @@ def _concluded(
     floor = [held.residual(end, twin) for twin in twins(held, end, 3)]
     noe = {name: 100.0 * float(each @ each) / spread for name, each in left.items()}
     noise_floor = 100.0 * float(np.mean([each @ each for each in floor])) / spread
+    if growth.steps:
+        # A grown model that sticks and slips where the axis doesn't has twins that say nothing.
+        own = [held.residual(begin, twin) for twin in twins(held, begin, 3)]
+        noise_floor = min(noise_floor, 100.0 * float(np.mean([each @ each for each in own])) / spread)
     scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
     missing = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
     # What the recordings held back don't show has been chance, or has been over before they were made.
@@ -192,6 +196,7 @@ def _concluded(
     scales = scales_of(held)
     findings = [_finding(validation, held, growth, end, step, scored, scales) for step in growth.steps]
     seen_rest = max(scored.noe_augmented - noise_floor, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
+    seen_rest *= held.unpaid(begin) if end.has_slip_dynamics else 1.0
     rest = min(max(growth.rest, seen_rest), 1.0) if missing else 0.0
     unknown = missing and (rest > _UNEXPLAINED or not findings)
     unexplained = Unexplained(rest, None)

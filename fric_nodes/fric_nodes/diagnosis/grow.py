@@ -44,7 +44,7 @@ _LITTLE = 0.004  # of what is missing at the start: laws that differ in form onl
 _CLEAR = 25.0  # times the floor
 _BY_CHANCE = 6.0  # and times what candidates take off twins
 _INFLATION = 2.0
-_LIGHTEST = 0.1  # of the mass that a fit began with
+_LIGHTEST = 0.25  # of the mass that a fit began with
 _LOWEST_LIMIT = 0.2  # of the largest recorded force
 _MOST_FORCE = 2.0  # of the largest recorded force, a term's
 _SAME = 0.35  # of the floor: nothing is missing when less than this is left above it
@@ -417,7 +417,8 @@ def audit(track: Track, begin: Model, end: Model) -> float:
             lacking[name] += float(left @ left)
     made = [track.residual(end, twin) for twin in twins(track, end, 2)]
     floor = float(np.mean([each @ each for each in made]))
-    return max(lacking["end"] - floor, 0.0) / max(lacking["begin"] - floor, 1e-300)
+    unpaid = track.unpaid(begin) if end.has_slip_dynamics else 1.0
+    return unpaid * max(lacking["end"] - floor, 0.0) / max(lacking["begin"] - floor, 1e-300)
 
 
 def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scales: Scales) -> tuple[State, list[Step]]:
@@ -461,21 +462,22 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> l
             fit = fitted_with(track, state.fit, offer, scales, 4, along)
         except ModelError:
             continue
-        fitted.append(_rival(track, state, offer, fit, found.tried))
+        fitted.append(_rival(track, state, offer, fit, found))
     fitted.sort(key=lambda rival: rival.score)
     for k, rival in enumerate(fitted[:2]):
         fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds_of(rival.fit.model, scales))
-        fitted[k] = _rival(track, state, rival.offer, fit, found.tried)
+        fitted[k] = _rival(track, state, rival.offer, fit, found)
     return sorted(fitted, key=lambda rival: rival.score)
 
 
-def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, screened: tuple[Tried, ...]) -> Rival:
-    left = unseen(track, fit, fit.residual)
+def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, found: Screening) -> Rival:
     effects = [each.column.term.effect for each in offer]
+    slips = any(effect.slip is not None for effect in effects)
+    left = unseen(track, fit, fit.residual) * (found.unpaid if slips else 1.0)
     dear = sum(_price(effect, state.excess) for effect in effects)
     names = [_name_of(fit.model, effect) for effect in effects]
     halfway = min((each.left for each in offer), default=left)
-    return Rival(effects[0], left, fit, left + dear, offer, tuple(names), max(halfway, left), screened)
+    return Rival(effects[0], left, fit, left + dear, offer, tuple(names), max(halfway, left), found.tried)
 
 
 def _price(effect: Effect, excess: float) -> float:

@@ -219,12 +219,14 @@ class Screening:
         tried: the best trial of each effect, the best effect first.
         laws: of effects with several laws, the best trial of another law than the one in ``tried``.
         pairs: the best pairs of different effects with what they leave together, the best first.
+        unpaid: by which what effects with slip dynamics leave is multiplied, see :meth:`Track.unpaid`.
     """
 
     alone: float
     tried: tuple[Tried, ...]
     laws: tuple[Tried, ...]
     pairs: tuple[tuple[Tried, Tried, float], ...]
+    unpaid: float = 1.0
 
 
 def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: Sequence[Array]) -> Screening:
@@ -252,6 +254,7 @@ def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: S
     refit = list(range(1 + len(twin_residuals), 1 + len(twin_residuals) + n_free))
     alone = gram.left(0, refit)
     chance_alone = [gram.left(1 + k, refit) for k in range(len(twin_residuals))]
+    unpaid = track.unpaid(fit.model) if any(column.term.effect.slip is not None for column in columns) else 1.0
     able: list[tuple[Tried, list[int]]] = []
     promise: dict[int, float] = {}
     for column, place, whole in zip(columns, places, wholes, strict=True):
@@ -260,11 +263,11 @@ def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: S
         solved = gram.solved(0, refit + place)
         if not column.amplitudes and solved[n_free] <= 0.0:
             continue  # the opposite of the effect, which there isn't
-        left = gram.left(0, refit + place)
+        left = gram.left(0, refit + place) * (unpaid if column.term.effect.slip is not None else 1.0)
         by_chance = max((base - gram.left(1 + k, refit + place) for k, base in enumerate(chance_alone)), default=0.0)
         able.append((Tried(column, left, alone - left, by_chance, solved[n_free:], solved[:n_free]), place))
         # A structure can't be there by a part: its values are judged by what it leaves as it is.
-        promise[id(column)] = gram.left(whole, refit) if whole else left
+        promise[id(column)] = gram.left(whole, refit) * unpaid if whole else left
     best: dict[str, Tried] = {}
     laws: dict[str, Tried] = {}
     for tried, _ in sorted(able, key=lambda each: promise[id(each[0].column)]):
@@ -273,10 +276,12 @@ def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: S
         if best.setdefault(name, tried).column.term.effect is not effect:
             laws.setdefault(name, tried)
     ranked, others = (tuple(sorted(each.values(), key=lambda one: one.left)) for each in (best, laws))
-    return Screening(alone, ranked, others, _pairs(gram, refit, able))
+    return Screening(alone, ranked, others, _pairs(gram, refit, able, unpaid), unpaid)
 
 
-def _pairs(gram: Gram, refit: list[int], able: Sequence[tuple[Tried, list[int]]]) -> tuple[tuple[Tried, Tried, float], ...]:
+def _pairs(
+    gram: Gram, refit: list[int], able: Sequence[tuple[Tried, list[int]]], unpaid: float
+) -> tuple[tuple[Tried, Tried, float], ...]:
     """The best pairs of trials of different effects, one pair for each two effects."""
     best: dict[tuple[str, str], tuple[Tried, Tried, float]] = {}
     n_free = len(refit)
@@ -285,7 +290,8 @@ def _pairs(gram: Gram, refit: list[int], able: Sequence[tuple[Tried, list[int]]]
             names = (one.column.term.effect.id, other.column.term.effect.id)
             if names[0] == names[1] or _exclude(one, other):
                 continue
-            left = gram.left(0, refit + place + beside)
+            slips = one.column.term.effect.slip is not None or other.column.term.effect.slip is not None
+            left = gram.left(0, refit + place + beside) * (unpaid if slips else 1.0)
             if names not in best or left < best[names][2]:
                 solved = gram.solved(0, refit + place + beside)
                 first = Tried(

@@ -200,6 +200,30 @@ class Track:
             parts.append(mass * beta / run.sample_time**2 * found)
         return self._finite(self.joined(parts))
 
+    def unpaid(self, model: Model) -> float:
+        """By how much less energy ``model`` seems to lack when its position is set instead of pushed; at least 1.
+
+        What a model with bristles seems to lack has to be held against that: its position is set.
+        """
+        if model.has_slip_dynamics:
+            return 1.0
+        universe = universe_of(model)
+        values = universe.values(model)
+        plant_values = np.array(model.plant_values)
+        inertia = model.plant.total_inertia(*model.plant_values)
+        parts = []
+        for k, run in enumerate(self.runs):
+            alpha, beta = self.gains(run)
+            state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k))
+            found = np.empty(run.effort.shape[0])
+            universe.loops.observe(
+                values, run.effort, run.position, run.step, self.n_substeps(model, run), run.load, run.temperature,
+                alpha, beta, self.noise[k], state, *universe.inner_states(model), found,
+            )  # fmt: skip
+            parts.append(inertia * beta / run.sample_time**2 * found)
+        pushed, put = self.residual(model), self._finite(self.joined(parts))
+        return max(float(pushed @ pushed) / max(float(put @ put), 1e-300), 1.0)
+
     def needed(self, model: Model, twin: Twin | None = None, extra: Term | None = None) -> Array:
         """As :meth:`residual`, by the force that ``model``, with the term ``extra``, needs along the measured motion [F]."""
         universe = universe_of(model)
