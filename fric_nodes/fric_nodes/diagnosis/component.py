@@ -189,7 +189,7 @@ def _waves(motion: Sequence[Motion]) -> Iterator[list[list[Array]]]:
     for number in np.geomspace(0.7, 25.0, _WAVES):
         wave = 2.0 * math.pi * float(number) / travel
         yield [
-            [change(each) * function(wave * each.position) for each in motion]
+            [change * function(wave * each.position) for each, change in zip(motion, changes, strict=True)]
             for function in (np.sin, np.cos)
-            for change in (lambda each: each.acceleration, lambda each: each.velocity**2)
+            for changes in ([each.acceleration for each in motion], [each.velocity**2 for each in motion])
         ]

@@ -322,7 +322,7 @@ def _unknown(where: Where, tracks: Sequence[Track], growth: Growth, scored: Vali
     tried = sorted((s for s in growth.last), key=lambda each: each.left)
     best = tried[0].column.term.effect if tried else None
     beside = f"; the best of them, {best.title}, doesn't explain it" if best is not None else ""
-    likely = _signature_of(tracks, growth)
+    likely = _signature_of(tracks, growth, rest)
     return Finding(
         effect="unknown",
         law="",
@@ -340,7 +340,7 @@ def _unknown(where: Where, tracks: Sequence[Track], growth: Growth, scored: Vali
     )
 
 
-def _signature_of(tracks: Sequence[Track], growth: Growth) -> Signature:
+def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float) -> Signature:
     """What is missing looks like, to the slowest observer to which it stands out: a slow one blurs how a contact sticks.
 
     Where one signature explains more than all the effects that were grown, these have only stood in for it.
@@ -350,7 +350,7 @@ def _signature_of(tracks: Sequence[Track], growth: Growth) -> Signature:
         if state.excess > _STANDS_OUT * state.floor or track.bandwidth >= growth.track.bandwidth:
             break
     whole = signatures(track, state.fit, () if growth.steps else growth.last)[0]
-    if not growth.steps or whole.share > 1.0 - growth.rest:
+    if not growth.steps or whole.share > 1.0 - rest:
         return whole
     return signatures(track, refit(track, growth.end.fit.model, max_iterations=_FIRST_FIT).fit, growth.last)[0]
 

@@ -44,8 +44,8 @@ _LITTLE = 0.004  # of what is missing at the start: laws that differ in form onl
 _CLEAR = 25.0  # times the floor
 _BY_CHANCE = 6.0  # and times what candidates take off twins
 _INFLATION = 2.0
-_LIGHTEST = 0.25  # of the mass that a fit began with
-_LOWEST_LIMIT = 0.2  # of the largest recorded force
+_LIGHTEST = 0.3  # of the mass that a fit began with
+_LOWEST_LIMIT = 0.3  # of the largest recorded force
 _MOST_FORCE = 2.0  # of the largest recorded force, a term's
 _SAME = 0.35  # of the floor: nothing is missing when less than this is left above it
 
@@ -260,10 +260,10 @@ def bounds_of(model: Model, scales: Scales) -> Bounds:
             if p.dimension in around:
                 low, high = around[p.dimension]
                 found[f"{prefix}.{p.name}"] = (min(low, value), max(high, value))
-    for p in model.parameters():
-        if "." not in p.name and p.declaration.dimension == "F s^2/x":
+    for held_by_plant in model.parameters():
+        if "." not in held_by_plant.name and held_by_plant.declaration.dimension == "F s^2/x":
             # Nothing moves a body without mass under no force: a model of nothing lacks little, too.
-            found[p.name] = (_LIGHTEST * scales.mass, scales.mass / _LIGHTEST)
+            found[held_by_plant.name] = (_LIGHTEST * scales.mass, scales.mass / _LIGHTEST)
     if is_driven(model):
         found["load_share"] = (0.05, 0.95)
     return found
@@ -325,7 +325,7 @@ def _grown(tracks: Sequence[Track], start: tuple[Track, State], first: Rival | N
     beginnings: tuple[Rival, ...] = ()
     while True:
         if first is not None:
-            rivals, first, last = [first], None, first.screened
+            rivals, last, first = [first], first.screened, None
         else:
             found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
             last = found.tried
@@ -433,7 +433,8 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         rivals = [
             rival for rival in rivals_of(track, without, replace(found, pairs=()), scales) if rival.effect.id != effect_id
         ]
-        if rivals and state.left - rivals[0].left > max(_OF_FLOOR * state.floor, _TO_STAY * begin.excess):
+        own = state.left + _price(state.fit.model.terms[list(state.fit.model.prefixes).index(step.term)].effect, without.excess)
+        if rivals and own - rivals[0].score > max(_OF_FLOOR * state.floor, _TO_STAY * begin.excess):
             state = refit(track, rivals[0].fit.model, max_iterations=6)
             term, rivals = rivals[0].names[0], rivals[1:]
         else:

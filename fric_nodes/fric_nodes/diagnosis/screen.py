@@ -231,8 +231,8 @@ class Screening:
 
 def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: Sequence[Array]) -> Screening:
     """Every candidate at first order, alone and in pairs, on blocks that it has not seen."""
-    promise = Promise(Along(track), fit)
-    trials = [trial for candidate in found for trial in promise.narrowed(candidate)]
+    quick = Promise(Along(track), fit)
+    trials = [trial for candidate in found for trial in quick.narrowed(candidate)]
     columns = columns_of(track, fit, trials)
     n_free = len(fit.names)
     stacked = [fit.residual[:, None], *(each[:, None] for each in twin_residuals), fit.jacobian]

@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ..diagnosis.result import Diagnosis, Finding, Prediction
-from ..diagnosis.twin import smooth
+from ..diagnosis.track import smooth
 from ..model_file import model_to_text
 from ..record import Array, Record
 from .checks import checks_section

@@ -19,7 +19,7 @@ from ..diagnosis.prove.axis import Setting
 from ..diagnosis.prove.experiment import Bench, draw_recording
 from ..diagnosis.prove.physics import Physics
 from ..diagnosis.result import Diagnosis, Finding, Prediction
-from ..diagnosis.twin import smooth
+from ..diagnosis.track import smooth
 from ..model import Model
 from ..record import Array, Record
 from ..report.figures import COLOURS, Curve, scatter_and_curves, stacked
