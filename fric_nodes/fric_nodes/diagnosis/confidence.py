@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from .grow import Growth, Step
+from .grow import Growth
+from .settle import Step
 
 __all__ = ["confidence_of", "features", "unknown_confidence"]
 

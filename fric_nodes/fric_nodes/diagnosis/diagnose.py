@@ -28,10 +28,12 @@ from .candidates import Scales, candidates, place_of, scales_of
 from .component import Signature, signatures
 from .confidence import confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
-from .grow import Growth, Step, best_track, grow, refit
+from .fitting import best_track, refit
+from .grow import Growth, grow
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
 from .screen import Tried
+from .settle import Step
 from .track import Fit, Track
 from .twin import twins
 

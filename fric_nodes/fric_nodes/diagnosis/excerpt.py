@@ -18,7 +18,8 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array, Index
-from .grow import Growth, free_names, refit
+from .fitting import free_names, refit
+from .grow import Growth
 from .track import Track
 
 __all__ = ["MOST", "Excerpt", "confirmed", "excerpt"]

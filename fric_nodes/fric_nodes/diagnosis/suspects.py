@@ -18,7 +18,7 @@ from ..model import Model, Term
 from ..record import Array, Record
 from .along import Along
 from .candidates import candidates, place_of, scales_of
-from .grow import bounds_of, free_names
+from .fitting import bounds_of, free_names
 from .locate import locate, moved_back, steady
 from .screen import Gram, Promise, blocks_of, columns_of
 from .track import Fit, Track

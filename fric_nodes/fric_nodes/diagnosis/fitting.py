@@ -1,0 +1,179 @@
+"""Fits of whole models to a track: what they leave where they were not fitted, and what their own twins leave."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Model, Term
+from ..plants import PLANTS
+from ..record import Array
+from .along import Along
+from .candidates import Scales, scales_of
+from .screen import Gram, Tried, blocks_of, restraint
+from .track import Bounds, Fit, Track
+from .twin import twins
+
+__all__ = ["State", "best_track", "bounds_of", "fitted_with", "free_names", "is_driven", "refit", "unseen"]
+
+_TWINS = 3
+_CLEAR = 25.0  # times the floor
+_INFLATION = 2.0
+_LIGHTEST = 0.3  # of the mass that a fit began with
+_LOWEST_LIMIT = 0.3  # of the largest recorded force
+_MOST_FORCE = 2.0  # of the largest recorded force, a term's
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A fitted model and what it leaves.
+
+    Attributes:
+        fit: to all blocks.
+        left: sum of squares on unseen blocks [F^2].
+        floor: the same on twins of the model, their mean [F^2].
+        chance: residuals of the twins, shape ``(n,)`` each [F].
+    """
+
+    fit: Fit
+    left: float
+    floor: float
+    chance: tuple[Array, ...]
+
+    @property
+    def excess(self) -> float:
+        """What is missing, above the floor [F^2]."""
+        return max(self.left - self.floor, 0.0)
+
+
+def is_driven(model: Model) -> bool:
+    """True when the model has two bodies because it has a transmission."""
+    return model.plant is PLANTS[model.plant.id].driven
+
+
+def free_names(model: Model) -> tuple[str, ...]:
+    """The parameters that a fit moves: all but shapes, and the share of the mass behind a transmission."""
+    return tuple(p.name for p in model.parameters() if not p.declaration.shape or (p.name == "load_share" and is_driven(model)))
+
+
+def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
+    """``model`` fitted to the track, and what it leaves."""
+    fit = track.fit(model, free_names(model), max_iterations, bounds_of(model, scales_of(track)))
+    made = twins(track, fit.model, _TWINS)
+    chance = tuple(track.residual(fit.model, twin) for twin in made)
+    floor = float(np.mean([_within_reason(track, fit, each) for each in chance]))
+    return State(fit, _within_reason(track, fit, fit.residual), floor, chance)
+
+
+def _within_reason(track: Track, fit: Fit, residual: Array) -> float:
+    """:func:`unseen`, for a model that is there: more than twice what it leaves where it was fitted is first order's fault."""
+    return min(unseen(track, fit, residual), _INFLATION * float(residual @ residual))
+
+
+def unseen(track: Track, fit: Fit, residual: Array) -> float:
+    """Sum of squares of ``residual`` on blocks left out of the fit in turn [F^2]."""
+    columns = np.concatenate([residual[:, None], fit.jacobian], axis=1)
+    held = np.full(columns.shape[1], restraint(track, fit))
+    gram = Gram(columns, blocks_of(track, columns.shape[0]), held)
+    return gram.left(0, range(1, columns.shape[1]))
+
+
+def fitted_with(
+    track: Track, fit: Fit, tried: Sequence[Tried], scales: Scales, max_iterations: int = 12, along: Along | None = None
+) -> Fit:
+    """The fitted model with the candidates, everything fitted together.
+
+    It begins where it lacks least: at the screening's values for the candidates, at its values for all parameters, or, where
+    the motion tells, at values fitted along it.
+    """
+    grown = fit.model.with_terms((*fit.model.terms, *(_start(each) for each in tried)))
+    names, bounds = free_names(grown), bounds_of(grown, scales)
+    starts = [grown, _moved(grown, fit, tried[0])]
+    along = along or Along(track)
+    if along.can(grown):
+        starts.append(along.fitted(grown, names, track.scale(grown, names), bounds))
+    best = min(starts, key=lambda model: float(np.sum(track.residual(model) ** 2)))
+    return track.fit(best, names, max_iterations, bounds)
+
+
+def _moved(grown: Model, fit: Fit, tried: Tried) -> Model:
+    """``grown`` with the refit's parameters where the screening would have them, within their bounds."""
+    values = grown.values
+    declared = {p.name: p.declaration for p in grown.parameters()}
+    names = grown.names
+    for name, change, scale in zip(fit.names, tried.moved, fit.scale, strict=True):
+        if name not in declared:
+            continue
+        k = names.index(name)
+        lowest = 0.1 * abs(float(values[k])) if declared[name].positive else declared[name].lower
+        values[k] = float(np.clip(values[k] + change * scale, lowest, declared[name].upper))
+    return grown.with_values(values)
+
+
+def _start(tried: Tried) -> Term:
+    held = tried.column.term
+    values = list(held.values)
+    names = [p.name for p in held.effect.parameters]
+    if tried.column.amplitudes:
+        for name, value in zip(tried.column.amplitudes, tried.coefficients, strict=True):
+            k = names.index(name)
+            p = held.effect.parameters[k]
+            values[k] = float(np.clip(value, p.lower, p.upper))
+    elif held.effect.neutral is not None:
+        for k, p in enumerate(held.effect.parameters):
+            if p.name in held.effect.amplitudes and p.dimension in ("s",):
+                values[k] *= float(np.clip(tried.coefficients[0], 0.3, 3.0))
+    return Term(held.effect, tuple(values))
+
+
+def bounds_of(model: Model, scales: Scales) -> Bounds:
+    """Where nonlinear parameters make sense on this recording."""
+    ranges = {
+        "x/s": (0.3 * scales.slow, 2.0 * scales.speed),
+        "s": (0.02 * scales.step, 2.0 * scales.duration),
+        "1/s": (2.0, 0.5 / scales.step),
+    }
+    scale_of = {  # of parameters that aren't the strength of an effect: shorter ones can't be told from none
+        "x": (2.0 * scales.grain, 2.0 * scales.travel),
+        "s": (2.0 * scales.step, 2.0 * scales.duration),
+    }
+    found: Bounds = {}
+    for prefix, held in zip(model.prefixes, model.terms, strict=True):
+        for p, value in zip(held.effect.parameters, held.values, strict=True):
+            if p.dimension == "F" and p.linear and not p.shape:
+                # A surplus at speeds that the recording doesn't hold could grow for ever.
+                found[f"{prefix}.{p.name}"] = (-_MOST_FORCE * scales.most, _MOST_FORCE * scales.most)
+            if p.linear or p.shape:
+                continue
+            if p.dimension == "F" and p.positive:
+                found[f"{prefix}.{p.name}"] = (_LOWEST_LIMIT * scales.most, math.inf)
+            strength = p.name in held.effect.amplitudes or held.effect.play is not None
+            places = p.dimension == "x" and not p.positive
+            around = ranges if strength or places else ranges | scale_of
+            if p.dimension in around:
+                low, high = around[p.dimension]
+                found[f"{prefix}.{p.name}"] = (min(low, value), max(high, value))
+    for held_by_plant in model.parameters():
+        if "." not in held_by_plant.name and held_by_plant.declaration.dimension == "F s^2/x":
+            # Nothing moves a body without mass under no force: a model of nothing lacks little, too.
+            found[held_by_plant.name] = (_LIGHTEST * scales.mass, scales.mass / _LIGHTEST)
+    if is_driven(model):
+        found["load_share"] = (0.05, 0.95)
+    return found
+
+
+def best_track(tracks: Sequence[Track], model: Model, max_iterations: int = 12) -> tuple[Track, State]:
+    """The fastest observer to which what ``model`` lacks stands out clearly, or the one to which it does most."""
+    best: tuple[float, Track, State] | None = None
+    for track in sorted(tracks, key=lambda each: -each.bandwidth):
+        state = refit(track, model, max_iterations=max_iterations)
+        quality = state.excess / max(state.floor, 1e-300)
+        if best is None or quality > best[0]:
+            best = (quality, track, state)
+        if quality > _CLEAR:
+            return track, state
+    assert best is not None
+    return best[1], best[2]

@@ -1,0 +1,108 @@
+"""Rivals: the most promising candidates of a screening, fitted in full together with all that is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..effect import Effect
+from ..model import Model, ModelError
+from .along import Along
+from .candidates import Scales
+from .fitting import State, bounds_of, fitted_with, unseen
+from .screen import Screening, Tried
+from .track import Fit, Track
+
+__all__ = ["OF_FLOOR", "PER_PARAMETER", "Rival", "earns", "name_of", "price_of", "rivals_of", "worth"]
+
+_PAIRS_FITTED = 2
+_PAIR_BETTER = 0.5  # of what the best single effect leaves, for a pair to be tried
+PER_PARAMETER = 0.012  # of what is missing
+_OTHER_LAWS = 2  # of the most promising effects are fitted in another law, too
+_FITTED = 4  # candidates that are fitted in full at each step
+OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
+_OF_EXCESS = 0.12  # and of what is missing: less is no explanation
+_BY_CHANCE = 6.0  # and times what candidates take off twins
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A candidate, or a pair of them, fitted in full.
+
+    Attributes:
+        effect: the first one.
+        left: sum of squares on unseen blocks [F^2].
+        fit: of the model with it.
+        score: ``left`` and a price for each parameter [F^2]; what is small beside the rest must not decide between effects.
+        offer: the trials that it was fitted from.
+        names: of its terms in the fitted model.
+        halfway: what the first of a pair leaves alone [F^2].
+        screened: all candidates at first order then, the best first.
+    """
+
+    effect: Effect
+    left: float
+    fit: Fit
+    score: float
+    offer: tuple[Tried, ...]
+    names: tuple[str, ...]
+    halfway: float
+    screened: tuple[Tried, ...]
+
+
+def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> list[Rival]:
+    """The most promising candidates, and pairs where these promise far more, fitted in full; the best first."""
+    offers: list[tuple[Tried, ...]] = [(each,) for each in found.tried[:_FITTED] if each.gain > 0.0]
+    # First order is no judge between the laws of one effect, whose differences are of the second.
+    foremost = {each.column.term.effect.id for each in found.tried[:_OTHER_LAWS]}
+    offers += [(each,) for each in found.laws if each.column.term.effect.id in foremost]
+    if found.tried and found.pairs:
+        single = max(found.tried[0].left - state.floor, 0.05 * state.excess)
+        offers += [
+            (one, other) for one, other, left in found.pairs[:_PAIRS_FITTED] if left - state.floor < _PAIR_BETTER * single
+        ]
+    fitted: list[Rival] = []
+    along = Along(track)
+    for offer in offers:
+        try:
+            fit = fitted_with(track, state.fit, offer, scales, 4, along)
+        except ModelError:
+            continue
+        fitted.append(_rival(track, state, offer, fit, found))
+    fitted.sort(key=lambda rival: rival.score)
+    for k, rival in enumerate(fitted[:2]):
+        fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds_of(rival.fit.model, scales))
+        fitted[k] = _rival(track, state, rival.offer, fit, found)
+    return sorted(fitted, key=lambda rival: rival.score)
+
+
+def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, found: Screening) -> Rival:
+    effects = [each.column.term.effect for each in offer]
+    slips = any(effect.slip is not None for effect in effects)
+    left = unseen(track, fit, fit.residual) * (found.unpaid if slips else 1.0)
+    dear = sum(price_of(effect, state.excess) for effect in effects)
+    names = [name_of(fit.model, effect) for effect in effects]
+    halfway = min((each.left for each in offer), default=left)
+    return Rival(effects[0], left, fit, left + dear, offer, tuple(names), max(halfway, left), found.tried)
+
+
+def price_of(effect: Effect, excess: float) -> float:
+    """What the parameters of ``effect`` cost [F^2]."""
+    return PER_PARAMETER * excess * sum(not p.shape for p in effect.parameters)
+
+
+def name_of(model: Model, effect: Effect) -> str:
+    """The prefix of the newest term of ``effect``."""
+    return [prefix for prefix, held in zip(model.prefixes, model.terms, strict=True) if held.effect is effect][-1]
+
+
+def worth(state: State, tried: Sequence[Tried]) -> bool:
+    """True when a screened candidate promises a real gain although nothing much is left."""
+    return bool(tried) and earns(state, tried[0].left, tried[:1])
+
+
+def earns(state: State, left: float, tried: Sequence[Tried]) -> bool:
+    """True when leaving ``left`` is more than what ``tried`` takes off by chance, and a real part of what is missing."""
+    gain = state.left - left
+    chance = max((each.by_chance for each in tried), default=0.0)
+    return gain > max(OF_FLOOR * state.floor, _OF_EXCESS * state.excess, _BY_CHANCE * chance)

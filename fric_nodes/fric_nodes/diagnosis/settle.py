@@ -1,0 +1,179 @@
+"""A grown model settles: each term earns its place again, against nothing and against its rivals, with all the others there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..effect import Effect
+from ..model import Model, Term
+from .candidates import Scales, candidates, scales_of
+from .fitting import State, bounds_of, free_names, refit
+from .rivals import OF_FLOOR, Rival, name_of, price_of, rivals_of
+from .screen import Tried, screen
+from .track import Track
+from .twin import twins
+from .universe import worth_trying
+
+__all__ = ["Settled", "Step", "audit", "merged", "settled"]
+
+_TO_STAY = 0.004  # of what is missing at the start, beside all other terms
+_HOPELESS = 0.5  # of what is missing: with more left, no exchange of a term makes an explanation
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A term that came.
+
+    Attributes:
+        term: its name in the grown model.
+        before: sum of squares on unseen blocks without it [F^2].
+        after: with it [F^2].
+        floor: what twins left then [F^2].
+        missing: what was missing then, above the floor [F^2].
+        rivals: what was fitted in its place, the best first.
+        screened: all candidates at first order, the best first.
+        price: of its parameters [F^2], as rivals pay it.
+    """
+
+    term: str
+    before: float
+    after: float
+    floor: float
+    missing: float
+    rivals: tuple[Rival, ...]
+    screened: tuple[Tried, ...]
+    price: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """The grown model after each of its terms has earned its place again.
+
+    Attributes:
+        begin: the refitted nominal model.
+        state: the grown one.
+        steps: the terms that stayed.
+        rest: share of what is missing that the grown model lacks too, where it was not fitted.
+        gone: terms that went, with the reason.
+    """
+
+    begin: State
+    state: State
+    steps: tuple[Step, ...]
+    rest: float
+    gone: tuple[tuple[str, str], ...]
+
+
+def settled(track: Track, begin: State, state: State, steps: list[Step]) -> Settled:
+    """Take away, exchange and audit the terms that ``steps`` brought."""
+    scales = scales_of(track)
+    begin = refit(track, begin.fit.model, max_iterations=6)
+    state, steps, gone = _pruned(track, begin, state, steps)
+    rest = audit(track, begin.fit.model, state.fit.model) if steps else 1.0
+    if len(steps) > 1 and rest < _HOPELESS:
+        state, steps = _exchanged(track, begin, state, steps, scales)
+        state, steps, more = _pruned(track, begin, state, steps)
+        gone += more
+        rest = audit(track, begin.fit.model, state.fit.model)
+    if rest > 1.0:
+        gone += [(step.term, "made what it was not fitted to worse") for step in steps]
+        state, steps, rest = begin, [], 1.0
+    return Settled(begin, state, tuple(steps), rest, tuple(gone))
+
+
+def merged(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step]]:
+    """A play and a spring beside each other as the one effect that is both, where that explains as much."""
+    transmission = [held for held in state.fit.model.terms if held.effect.play is not None or held.effect.link is not None]
+    both = [each for each in worth_trying() if each.play is not None and each.link is not None]
+    if len(transmission) != 2 or all(held.effect.play is None for held in transmission):
+        return state, steps
+    given: dict[str, float] = {}
+    for held in transmission:
+        for p, value in zip(held.effect.parameters, held.values, strict=True):
+            given[p.name] = given.get(p.name, 0.0) + value  # two plays in a row are one
+    effect = next((each for each in both if {p.name for p in each.parameters} == set(given)), None)
+    if effect is None:
+        return state, steps
+    others = [held for held in state.fit.model.terms if held not in transmission]
+    one = refit(track, state.fit.model.with_terms([*others, Term(effect, tuple(effect.values(given)))]))
+    if one.left - state.left > max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
+        return state, steps
+    gone = {held.effect.id for held in transmission}
+    old = [step for step in steps if step.term.split("#")[0] in gone]
+    if not old:
+        return state, steps
+    step = replace(old[0], term=name_of(one.fit.model, effect), after=old[-1].after)
+    return one, [*(each for each in steps if each not in old), step]
+
+
+def audit(track: Track, begin: Model, end: Model) -> float:
+    """Share of what ``begin`` lacks that ``end`` lacks too, both fitted to one half of the recordings and judged on the other.
+
+    The halves interleave: first and third quarter against second and fourth. The models follow the recordings from begin to
+    end both times: where a play or a contact stands at the start of a quarter, only what came before can tell. Above 1 the
+    grown model is the worse one.
+    """
+    n = track.residual(begin).shape[0]
+    first = (np.arange(n) * 4 // n) % 2 == 0
+    lacking = {"begin": 0.0, "end": 0.0}
+    for rows in (first, ~first):
+        for name, model in (("begin", begin), ("end", end)):
+            fitted = track.fit(model, free_names(model), 6, bounds_of(model, scales_of(track)), rows).model
+            left = track.residual(fitted)[~rows]
+            lacking[name] += float(left @ left)
+    made = [track.residual(end, twin) for twin in twins(track, end, 2)]
+    floor = float(np.mean([each @ each for each in made]))
+    unpaid = track.unpaid(begin) if end.has_slip_dynamics else 1.0
+    return unpaid * max(lacking["end"] - floor, 0.0) / max(lacking["begin"] - floor, 1e-300)
+
+
+def _effect_of(model: Model, name: str) -> Effect:
+    """The effect of the term ``name``."""
+    return model.terms[list(model.prefixes).index(name)].effect
+
+
+def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scales: Scales) -> tuple[State, list[Step]]:
+    """Each term against its rivals with all the others there: what came first was chosen while the others were missing."""
+    for k, step in enumerate(list(steps)):
+        effect_id = step.term.split("#")[0]
+        terms = [held for held in state.fit.model.terms if held.effect.id != effect_id]
+        if len(terms) != len(state.fit.model.terms) - 1:
+            continue
+        without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
+        found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance)
+        rivals = [
+            rival for rival in rivals_of(track, without, replace(found, pairs=()), scales) if rival.effect.id != effect_id
+        ]
+        own = state.left + price_of(
+            state.fit.model.terms[list(state.fit.model.prefixes).index(step.term)].effect, without.excess
+        )
+        if rivals and own - rivals[0].score > max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
+            state = refit(track, rivals[0].fit.model, max_iterations=6)
+            term, rivals = rivals[0].names[0], rivals[1:]
+        else:
+            term = step.term
+        price = price_of(_effect_of(state.fit.model, term), without.excess)
+        beside = without.left, state.left, without.floor, without.excess
+        steps[k] = Step(term, *beside, tuple(rivals), found.tried, price)
+    return state, steps
+
+
+def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step], list[tuple[str, str]]]:
+    """Each term taken away again, everything else fitted anew; it goes when hardly anything is lost."""
+    gone: list[tuple[str, str]] = []
+    for step in list(steps):
+        if len(steps) < 2:
+            break
+        effect_id = step.term.split("#")[0]
+        terms = [held for held in state.fit.model.terms if held.effect.id != effect_id]
+        if len(terms) != len(state.fit.model.terms) - 1:
+            continue
+        without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
+        lost = without.left - state.left
+        if lost < max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
+            state = without
+            steps = [each for each in steps if each is not step]
+            gone.append((effect_id, "not needed any more beside the terms that came after it"))
+    return state, steps, gone
