@@ -59,6 +59,8 @@ def test_physics_that_no_effect_describes_is_said_to_be_unknown() -> None:
     found = diagnose(case.train, case.validation, case.nominal)
     assert found.mismatch
     assert found.findings[0].effect == "unknown"
+    # A mass that changes with time has the signature of a load, whatever the reason.
+    assert found.findings[0].component == "load"
 
 
 def test_the_report_is_plain_data_and_the_grown_model_reads_back(presliding: tuple[object, Diagnosis]) -> None:
