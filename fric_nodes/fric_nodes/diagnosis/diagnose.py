@@ -44,6 +44,7 @@ _FAST = 1.0  # largest product of bandwidth and sample time
 _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
 _UNEXPLAINED = 0.2  # of what was missing: with more left, something unknown remains
+_SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, what was found is no explanation and is not named
 _FIRST_FIT = 6  # iterations, by which starts are compared
 _STANDS_OUT = 10.0  # times the floor
@@ -196,17 +197,20 @@ def _concluded(
         end, left["augmented"] = begin, left["refit"]
         scored = replace(scored, noe_augmented=noe["refit"])
     scales = scales_of(held)
-    findings = [_finding(validation, held, growth, end, step, scored, scales) for step in growth.steps]
     seen_rest = max(scored.noe_augmented - noise_floor, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
     seen_rest *= held.unpaid(begin) if end.has_slip_dynamics else 1.0
     rest = min(max(growth.rest, seen_rest), 1.0) if missing else 0.0
-    unknown = missing and (rest > _UNEXPLAINED or not findings)
+    findings = [_finding(validation, held, growth, end, step, scored, scales, rest) for step in growth.steps]
+    likely = _signature_of(tracks, growth, rest) if missing and (rest > _SIGNED or not findings) else None
+    # Where one signature explains more than several effects do together, these have only stood in for it.
+    stand_in = likely is not None and len(findings) > 1 and likely.share > 1.0 - rest
+    unknown = missing and (rest > _UNEXPLAINED or not findings or stand_in)
     unexplained = Unexplained(rest, None)
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
         where = _where_left(held, left["augmented"], floor, scales, end)
         unexplained = Unexplained(rest, where)
-        if unknown:
-            findings = [_unknown(where, tracks, growth, scored, rest), *([] if rest > _HARDLY else findings)]
+        if likely is not None and unknown:
+            findings = [_unknown(where, likely, growth, scored, rest), *([] if rest > _HARDLY or stand_in else findings)]
     return Diagnosis(
         mismatch=missing,
         checks=tuple(checks),
@@ -262,7 +266,14 @@ def _nominal_part(nominal: Model, fit: Fit) -> NominalPart:
 
 
 def _finding(
-    validation: Sequence[Record], held: Track, growth: Growth, end: Model, step: Step, scored: Validation, scales: Scales
+    validation: Sequence[Record],
+    held: Track,
+    growth: Growth,
+    end: Model,
+    step: Step,
+    scored: Validation,
+    scales: Scales,
+    rest: float,
 ) -> Finding:
     place = list(end.prefixes).index(step.term)
     effect = end.terms[place].effect
@@ -278,7 +289,7 @@ def _finding(
     excess = max(step.missing, 1e-300)
     share = min(max((step.before - step.after) / max(excess, growth.begin.excess), 0.0), 1.0)
     rival = next((each for each in step.rivals if effect.id not in {name.split("#")[0] for name in each.names}), None)
-    sure = confidence_of(growth, step)
+    sure = confidence_of(rest, step)
     parameters = {
         p.name: Estimate(p.value, end.standard_errors.get(p.name), p.declaration.unit(end.units))
         for p in end.parameters()
@@ -320,17 +331,16 @@ def _where_left(held: Track, residual: Array, floor: Sequence[Array], scales: Sc
     return locate(held, energy, scales, model)
 
 
-def _unknown(where: Where, tracks: Sequence[Track], growth: Growth, scored: Validation, rest: float) -> Finding:
+def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation, rest: float) -> Finding:
     tried = sorted((s for s in growth.last), key=lambda each: each.left)
     best = tried[0].column.term.effect if tried else None
     beside = f"; the best of them, {best.title}, doesn't explain it" if best is not None else ""
-    likely = _signature_of(tracks, growth, rest)
     return Finding(
         effect="unknown",
         law="",
         title="something that no known effect explains",
-        confidence=unknown_confidence(growth, rest),
-        runner_up=RunnerUp(best.id, round(1.0 - unknown_confidence(growth, rest), 4)) if best is not None else None,
+        confidence=unknown_confidence(rest),
+        runner_up=RunnerUp(best.id, round(1.0 - unknown_confidence(rest), 4)) if best is not None else None,
         where=where,
         component=likely.component,
         share=rest,
@@ -343,10 +353,7 @@ def _unknown(where: Where, tracks: Sequence[Track], growth: Growth, scored: Vali
 
 
 def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float) -> Signature:
-    """What is missing looks like, to the slowest observer to which it stands out: a slow one blurs how a contact sticks.
-
-    Where one signature explains more than all the effects that were grown, these have only stood in for it.
-    """
+    """What is missing looks like, to the slowest observer to which it stands out: a slow one blurs how a contact sticks."""
     for track in sorted(tracks, key=lambda each: each.bandwidth):
         state = refit(track, growth.begin.fit.model, max_iterations=_FIRST_FIT)
         if state.excess > _STANDS_OUT * state.floor or track.bandwidth >= growth.track.bandwidth:
