@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Model
-from ..record import Array, Mask
+from ..record import Array
 from .candidates import Scales
 from .track import Track, smooth
 
@@ -202,8 +202,3 @@ def moved_back(signal: Array, step: float, bandwidth: float) -> Array:
     """A signal of the observer without its delay."""
     shift = round(2.0 / (bandwidth * step))
     return np.concatenate([signal[shift:], np.full(min(shift, signal.shape[0]), signal[-1] * 0.0)])
-
-
-def resting(velocity: Array, scales: Scales) -> Mask:
-    """True where the axis rests."""
-    return np.asarray(np.abs(velocity) < scales.slow, dtype=np.bool_)
