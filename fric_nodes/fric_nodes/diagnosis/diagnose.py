@@ -43,6 +43,7 @@ _BANDWIDTHS = (45.0, 140.0, 400.0)  # [rad/s]
 _FAST = 1.0  # largest product of bandwidth and sample time
 _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
+_FLOOR_KNOWN = 0.1  # of itself, how well a floor is known
 _UNEXPLAINED = 0.2  # of what was missing: with more left, something unknown remains
 _SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, what was found is no explanation and is not named
@@ -187,7 +188,8 @@ def _concluded(
     if growth.steps:
         # A grown model that sticks and slips where the axis doesn't has twins that say nothing.
         own = [held.residual(begin, twin) for twin in twins(held, begin, 3)]
-        noise_floor = min(noise_floor, 100.0 * float(np.mean([each @ each for each in own])) / spread)
+        floor = min(floor, own, key=lambda twins_of: float(np.mean([each @ each for each in twins_of])))
+        noise_floor = 100.0 * float(np.mean([each @ each for each in floor])) / spread
     scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
     missing = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
     # What the recordings held back don't show has been chance, or has been over before they were made.
@@ -197,7 +199,9 @@ def _concluded(
         end, left["augmented"] = begin, left["refit"]
         scored = replace(scored, noe_augmented=noe["refit"])
     scales = scales_of(held)
-    seen_rest = max(scored.noe_augmented - noise_floor, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
+    # Floors of few twins are known to a tenth or two of themselves, no better.
+    sure = noise_floor * _FLOOR_KNOWN + 200.0 * float(np.std([each @ each for each in floor])) / spread
+    seen_rest = max(scored.noe_augmented - noise_floor - sure, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
     seen_rest *= held.unpaid(begin) if end.has_slip_dynamics else 1.0
     rest = min(max(growth.rest, seen_rest), 1.0) if missing else 0.0
     findings = [_finding(validation, held, growth, end, step, scored, scales, rest) for step in growth.steps]

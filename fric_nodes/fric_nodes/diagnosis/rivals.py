@@ -53,6 +53,8 @@ class Rival:
 def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> list[Rival]:
     """The most promising candidates, and pairs where these promise far more, fitted in full; the best first."""
     offers: list[tuple[Tried, ...]] = [(each,) for each in found.tried[:_FITTED] if each.gain > 0.0]
+    # First order fails where a contact sticks in the model and slides in the machine; the force along the motion doesn't.
+    offers += [(each,) for each in found.foremost if (each,) not in offers]
     # First order is no judge between the laws of one effect, whose differences are of the second.
     foremost = {each.column.term.effect.id for each in found.tried[:_OTHER_LAWS]}
     offers += [(each,) for each in found.laws if each.column.term.effect.id in foremost]
