@@ -46,7 +46,7 @@ class Along:
 
     def residual(self, model: Model, extra: Term | None = None) -> Array:
         """The force that ``model``, with the term ``extra``, lacks [F], as the observer would see it, where the axis moves."""
-        return self._track.needed(model, None, extra)[self.moving]
+        return self._track.needed(model, extra)[self.moving]
 
     def fitted(self, model: Model, names: Sequence[str], scale: Array, bounds: Mapping[str, tuple[float, float]]) -> Model:
         """``model`` with the parameters ``names``, of the sizes ``scale``, such that it lacks least along the motion."""

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..record import Array
+from .candidates import place_of
 from .screen import Tried
 from .track import Fit, Motion, Track
 
@@ -80,8 +81,6 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
             found[title] = signature
     best = min(tried, key=lambda each: each.left, default=None)
     if best is not None:
-        from .candidates import place_of
-
         effect = best.column.term.effect
         left = best.left / max(best.left + best.gain, 1e-300)
         found[effect.title] = _marked(place_of(effect), effect.title, left, len(effect.parameters), independent)

@@ -11,27 +11,25 @@ import math
 
 from .settle import Step
 
-__all__ = ["confidence_of", "features", "unknown_confidence"]
+__all__ = ["confidence_of", "margin_of", "unknown_confidence"]
 
 _OFFSET, _BY_RIVAL, _BY_REST = 1.2, 1.05, -9.4
 _MOST = 0.995
 
 
-def features(rest: float, step: Step) -> tuple[float, float]:
-    """Logarithm of what the best rival leaves over what the effect leaves, and the share that nothing explains."""
+def margin_of(step: Step) -> float:
+    """Logarithm of what the best rival leaves over what the effect leaves, the price of parameters included."""
     slack = 0.15 * step.floor + 0.01 * step.missing
     effect_id = step.term.split("#")[0]
     others = [each.score for each in step.rivals if effect_id not in {name.split("#")[0] for name in each.names}]
     rival = min(others, default=step.before)
     own = step.after + step.price
-    margin = math.log((max(rival - step.floor, 0.0) + slack) / (max(own - step.floor, 0.0) + slack))
-    return margin, rest
+    return math.log((max(rival - step.floor, 0.0) + slack) / (max(own - step.floor, 0.0) + slack))
 
 
 def confidence_of(rest: float, step: Step) -> float:
-    """Probability that the effect of ``step`` is what is missing."""
-    margin, rest = features(rest, step)
-    return round(min(1.0 / (1.0 + math.exp(-(_OFFSET + _BY_RIVAL * margin + _BY_REST * rest))), _MOST), 4)
+    """Probability that the effect of ``step`` is what is missing, where the share ``rest`` of that is left unexplained."""
+    return round(min(1.0 / (1.0 + math.exp(-(_OFFSET + _BY_RIVAL * margin_of(step) + _BY_REST * rest))), _MOST), 4)
 
 
 def unknown_confidence(rest: float) -> float:

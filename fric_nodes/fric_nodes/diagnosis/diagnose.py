@@ -2,7 +2,8 @@
 
 In this order: faults of the instrument; parameters before structure; is anything missing at all, beside what a twin leaves;
 which effects, grown and pruned on blocks that no fit has seen; and then, once and for the record, the validation recordings,
-which no fit and no choice has touched.
+which no fit has touched. They bring nothing in, but they can take away: what they speak against is withdrawn, and what they
+show to be left makes a finding unsure or ``unknown``.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from .candidates import Scales, candidates, place_of, scales_of
 from .component import Signature, signatures
 from .confidence import confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
-from .fitting import best_track, refit
+from .fitting import best_track, bounds_of, free_names, refit
 from .grow import Growth, grow
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
@@ -154,8 +155,9 @@ def _started(nominal: Model, train: Sequence[Record]) -> tuple[list[Track], Mode
     except (IdentificationError, np.linalg.LinAlgError):
         pass
     tracks = _tracks(train, starts[0])
-    fits = [refit(tracks[0], start, max_iterations=_FIRST_FIT) for start in starts]
-    return tracks, min(fits, key=lambda state: float(state.fit.residual @ state.fit.residual)).fit.model
+    bounds = bounds_of(starts[0], scales_of(tracks[0]))
+    fits = [tracks[0].fit(start, free_names(start), _FIRST_FIT, bounds) for start in starts]
+    return tracks, min(fits, key=lambda fit: float(fit.residual @ fit.residual)).model
 
 
 def _tracks(train: Sequence[Record], start: Model) -> list[Track]:
@@ -182,14 +184,13 @@ def _concluded(
     held = _shown(validation, track, begin)
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
     spread = _spread(held)
-    floor = [held.residual(end, twin) for twin in twins(held, end, 3)]
+    # A grown model that sticks and slips where the axis doesn't has twins that say nothing: the quieter ones count.
+    floors = [
+        [held.residual(model, twin) for twin in twins(held, model, 3)] for model in ([end, begin] if growth.steps else [end])
+    ]
+    floor = min(floors, key=lambda each: sum(float(one @ one) for one in each))
     noe = {name: 100.0 * float(each @ each) / spread for name, each in left.items()}
     noise_floor = 100.0 * float(np.mean([each @ each for each in floor])) / spread
-    if growth.steps:
-        # A grown model that sticks and slips where the axis doesn't has twins that say nothing.
-        own = [held.residual(begin, twin) for twin in twins(held, begin, 3)]
-        floor = min(floor, own, key=lambda twins_of: float(np.mean([each @ each for each in twins_of])))
-        noise_floor = 100.0 * float(np.mean([each @ each for each in floor])) / spread
     scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
     missing = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
     # What the recordings held back don't show has been chance, or has been over before they were made.
@@ -205,9 +206,11 @@ def _concluded(
     seen_rest *= held.unpaid(begin) if end.has_slip_dynamics else 1.0
     rest = min(max(growth.rest, seen_rest), 1.0) if missing else 0.0
     findings = [_finding(validation, held, growth, end, step, scored, scales, rest) for step in growth.steps]
-    likely = _signature_of(tracks, growth, rest) if missing and (rest > _SIGNED or not findings) else None
-    # Where one signature explains more than several effects do together, these have only stood in for it.
-    stand_in = likely is not None and len(findings) > 1 and likely.share > 1.0 - rest
+    likely, stand_in = None, False
+    if missing and (rest > _SIGNED or not findings):
+        likely, of_all = _signature_of(tracks, growth, rest)
+        # Where one signature explains more than several effects do together, these have only stood in for it.
+        stand_in = of_all and len(findings) > 1
     unknown = missing and (rest > _UNEXPLAINED or not findings or stand_in)
     unexplained = Unexplained(rest, None)
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
@@ -356,16 +359,19 @@ def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation
     )
 
 
-def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float) -> Signature:
-    """What is missing looks like, to the slowest observer to which it stands out: a slow one blurs how a contact sticks."""
+def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float) -> tuple[Signature, bool]:
+    """The signature of all that is missing, and True, where it explains more than what was grown; else that of what is left.
+
+    Looked at by the slowest observer to which it stands out: a slow one blurs how a contact sticks.
+    """
     for track in sorted(tracks, key=lambda each: each.bandwidth):
         state = refit(track, growth.begin.fit.model, max_iterations=_FIRST_FIT)
         if state.excess > _STANDS_OUT * state.floor or track.bandwidth >= growth.track.bandwidth:
             break
     whole = signatures(track, state.fit, () if growth.steps else growth.last)[0]
     if not growth.steps or whole.share > 1.0 - rest:
-        return whole
-    return signatures(track, refit(track, growth.end.fit.model, max_iterations=_FIRST_FIT).fit, growth.last)[0]
+        return whole, True
+    return signatures(track, refit(track, growth.end.fit.model, max_iterations=_FIRST_FIT).fit, growth.last)[0], False
 
 
 def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, ...]:

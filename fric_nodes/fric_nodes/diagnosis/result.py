@@ -97,7 +97,7 @@ class Rejected:
 
 @dataclass(frozen=True)
 class Validation:
-    """NOE on recordings that no fit and no choice has seen [%], and what noise alone leaves."""
+    """NOE on recordings that no fit has seen [%], and what noise alone leaves."""
 
     noe_nominal: float
     noe_refit: float

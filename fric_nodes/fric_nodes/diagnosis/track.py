@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -224,24 +223,20 @@ class Track:
         pushed, put = self.residual(model), self._finite(self.joined(parts))
         return max(float(pushed @ pushed) / max(float(put @ put), 1e-300), 1.0)
 
-    def needed(self, model: Model, twin: Twin | None = None, extra: Term | None = None) -> Array:
+    def needed(self, model: Model, extra: Term | None = None) -> Array:
         """As :meth:`residual`, by the force that ``model``, with the term ``extra``, needs along the measured motion [F]."""
         universe = universe_of(model)
         values = universe.values(model)
         if extra is not None:
             universe.put(values, extra)
-        if twin is not None:
-            motion = motions(self, twin.positions, raw=model.has_slip_dynamics)
-        else:
-            motion = self.raw_motion if model.has_slip_dynamics else self.motion
+        motion = self.raw_motion if model.has_slip_dynamics else self.motion
         found = []
-        for k, (run, time, each) in enumerate(zip(self.runs, self.time, motion, strict=True)):
+        for run, time, each, given in zip(self.runs, self.time, motion, self._applied(model), strict=True):
             effort, friction = np.empty_like(time), np.empty_like(time)
             universe.loops.predict(
                 values, time - 0.5 * each.step, each.position, each.velocity, each.acceleration, each.step, run.load,
                 run.temperature, *universe.inner_states(model), effort, friction,
             )  # fmt: skip
-            given = self._applied(model)[k] if twin is None else respond(model, twin.efforts[k], each.step) + twin.extras[k]
             found.append(effort - given)
         return self._finite(self.seen(found))
 
@@ -253,19 +248,18 @@ class Track:
     @cached_property
     def motion(self) -> tuple[Motion, ...]:
         """The measured motion of each run."""
-        return motions(self, [run.position for run in self.runs])
+        return tuple(_motion(run, _SMOOTH * self.bandwidth) for run in self.runs)
 
     @cached_property
     def raw_motion(self) -> tuple[Motion, ...]:
         """The measured motion of each run, as the encoder gives it: a filter would stretch bristles that are stiff."""
-        return motions(self, [run.position for run in self.runs], raw=True)
+        return tuple(_motion(run, math.inf) for run in self.runs)
 
     def _applied(self, model: Model) -> list[Array]:
         """What comes out of the command path of ``model`` [F], per run; that of the last model is kept."""
         path = tuple((held.effect.key, held.values) for held in model.terms if held.effect.command is not None)
         if self._paths.get("path") != path:
-            runs = zip(self.runs, self.motion, strict=True)
-            self._paths.update(path=path, given=[respond(model, run.effort, each.step) for run, each in runs])
+            self._paths.update(path=path, given=[respond(model, run.effort, run.sample_time) for run in self.runs])
         return self._paths["given"]  # type: ignore[no-any-return]
 
     @cached_property
@@ -291,11 +285,6 @@ class Track:
             alpha, beta = self.gains(run)
             parts.append(np.asarray(lfilter([0.0, beta], [1.0, alpha + beta - 2.0, 1.0 - alpha], force), dtype=np.float64))
         return self.joined(parts)
-
-    def residuals(self, models: Sequence[Model]) -> list[Array]:
-        """:meth:`residual` of several models, on all cores."""
-        with ThreadPoolExecutor(2) as pool:
-            return list(pool.map(self.residual, models))
 
     def scale(self, model: Model, names: Sequence[str]) -> Array:
         """Size of each of the parameters ``names``.
@@ -406,14 +395,9 @@ def smooth(signal: Array, step: float, cutoff: float) -> Array:
     return result
 
 
-def motions(track: Track, positions: Sequence[Array], *, raw: bool = False) -> tuple[Motion, ...]:
-    """The motion of each run of which ``positions`` were measured, smoothed unless it is to be ``raw``."""
-    found = []
-    for run, measured in zip(track.runs, positions, strict=True):
-        step = run.sample_time
-        position = np.concatenate([[run.start[0]], measured])
-        if not raw:
-            position = smooth(position, step, _SMOOTH * track.bandwidth)
-        velocity = np.diff(position) / step
-        found.append(Motion(0.5 * (position[1:] + position[:-1]), velocity, np.gradient(velocity, step), step))
-    return tuple(found)
+def _motion(run: Run, cutoff: float) -> Motion:
+    """The measured motion of ``run`` without what is faster than ``cutoff`` [rad/s]."""
+    step = run.sample_time
+    position = smooth(np.concatenate([[run.start[0]], run.position]), step, cutoff)
+    velocity = np.diff(position) / step
+    return Motion(0.5 * (position[1:] + position[:-1]), velocity, np.gradient(velocity, step), step)
