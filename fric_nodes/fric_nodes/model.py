@@ -172,6 +172,11 @@ class Model:
         """True when a pre-sliding law replaces exact sticking."""
         return any(held.effect.slip is not None for held in self.terms)
 
+    @property
+    def total_inertia(self) -> float:
+        """Of all bodies together [F s^2/x]."""
+        return self.plant.total_inertia(*self.plant_values)
+
     def max_rate(self) -> float:
         """Fastest rate of the plant and of the model's terms on its mass [1/s]; 0 when nothing is fast."""
         inertia = self.plant.inertia(*self.plant_values)

@@ -8,20 +8,20 @@ to start: which of many values of a candidate promise most, and from which value
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from ..identification.gauss_newton import minimise
 from ..model import Model, Term
 from ..plants import PLANTS
 from ..record import Array
-from .track import Track
+from .track import Bounds, Track, fitted_values
 
 __all__ = ["Along"]
 
 _REST = 0.01  # of the fast speed, below which the body may rest
 _ITERATIONS = 5
+_STRIDE = 0.4  # times 1/w
 
 
 class Along:
@@ -31,11 +31,14 @@ class Along:
         track: the recordings.
 
     Attributes:
+        stride: rows of the observer's signals that are told from each other.
         moving: rows of the observer's signals in which the axis moves, shape ``(n,)``.
     """
 
     def __init__(self, track: Track) -> None:
         self._track = track
+        slowest = min((run.sample_time for run in track.runs), default=1.0)
+        self.stride = max(int(_STRIDE / (track.bandwidth * slowest)), 1)
         speed = np.abs(np.concatenate([each.velocity for each in track.motion]))
         rest = max(_REST * float(np.quantile(speed, 0.98)), 4.0 * max(track.noise) * track.bandwidth)
         self.moving = track.joined([(np.abs(each.velocity) > rest).astype(np.float64) for each in track.motion]) > 0.5
@@ -48,33 +51,19 @@ class Along:
         """The force that ``model``, with the term ``extra``, lacks [F], as the observer would see it, where the axis moves."""
         return self._track.needed(model, extra)[self.moving]
 
-    def fitted(self, model: Model, names: Sequence[str], scale: Array, bounds: Mapping[str, tuple[float, float]]) -> Model:
+    def fitted(self, model: Model, names: Sequence[str], scale: Array, bounds: Bounds) -> Model:
         """``model`` with the parameters ``names``, of the sizes ``scale``, such that it lacks least along the motion."""
-        index = np.array([model.names.index(name) for name in names], dtype=np.int64)
-        declared = [parameter.declaration for parameter in model.parameters()]
-        lower = np.array([1e-9 * s if declared[k].positive else declared[k].lower for k, s in zip(index, scale, strict=True)])
-        upper = np.array([declared[k].upper for k in index])
-        for k, name in enumerate(names):
-            low, high = bounds.get(name, (-np.inf, np.inf))
-            lower[k], upper[k] = max(lower[k], low), min(upper[k], high)
-        values = model.values
-
-        def at(point: Array) -> Model:
-            trial = values.copy()
-            trial[index] = point * scale
-            return model.with_values(trial)
-
-        answer = minimise(
-            lambda point: self.residual(at(point)),
-            values[index] / scale,
-            lower / scale,
-            upper / scale,
+        return fitted_values(
+            self.residual,
+            model,
+            names,
+            scale,
+            bounds,
             difference=1e-3,
             point_tolerance=1e-3,
             cost_tolerance=1e-4,
             max_iterations=_ITERATIONS,
-        )
-        return at(answer.point)
+        )[0]
 
     def changes(self, model: Model, names: Sequence[str], scale: Array) -> Array:
         """Derivative of :meth:`residual` by the parameters ``names``, per ``scale`` of each, shape ``(n, n_names)``."""

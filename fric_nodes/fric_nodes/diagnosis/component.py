@@ -69,8 +69,7 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
     nominal = fit.jacobian[::stride]
     target = missing[::stride]
     alone = _left(nominal, target)
-    # A low-passed signal holds about so many independent numbers.
-    independent = max(0.5 * track.bandwidth * float(sum(np.sum(run.step) for run in track.runs)), 50.0)
+    independent = max(track.independent, 50.0)
     held = _Motions(track.motion, [run.effort for run in track.runs], track.time)
     found: dict[str, Signature] = {}
     for component, title, columns in _ways(track, held, missing):

@@ -45,7 +45,10 @@ _FAST = 1.0  # largest product of bandwidth and sample time
 _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
 _FLOOR_KNOWN = 0.1  # of itself, how well a floor is known
-_UNEXPLAINED = 0.2  # of what was missing: with more left, something unknown remains
+_KEPT = 0.4  # of what a grown model took off where it was fitted, to be found on the recordings held back
+_UNEXPLAINED = 0.15  # of what was missing: with more left, something unknown remains
+_FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is missing is known the worse
+_MANY = 3  # effects at once that still leave something are more likely to have stood in for one
 _SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, what was found is no explanation and is not named
 _FIRST_FIT = 6  # iterations, by which starts are compared
@@ -194,7 +197,7 @@ def _concluded(
     scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
     missing = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
     # What the recordings held back don't show has been chance, or has been over before they were made.
-    missing = missing and noe["refit"] > (1.0 + _CONFIRMED) * noise_floor
+    missing = missing and (noe["refit"] > (1.0 + _CONFIRMED) * noise_floor or _paired(growth, noe, noise_floor))
     if not missing or noe["augmented"] > noe["refit"]:
         growth = replace(growth, end=growth.begin, steps=(), rejected=(*growth.rejected, *_withdrawn(growth, missing)))
         end, left["augmented"] = begin, left["refit"]
@@ -211,7 +214,9 @@ def _concluded(
         likely, of_all = _signature_of(tracks, growth, rest)
         # Where one signature explains more than several effects do together, these have only stood in for it.
         stand_in = of_all and len(findings) > 1
-    unknown = missing and (rest > _UNEXPLAINED or not findings or stand_in)
+    most = _UNEXPLAINED if len(findings) < _MANY else _SIGNED
+    unsure = _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300)
+    unknown = missing and (rest > min(most + unsure, _HARDLY) or not findings or stand_in)
     unexplained = Unexplained(rest, None)
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
         where = _where_left(held, left["augmented"], floor, scales, end)
@@ -235,6 +240,15 @@ def _concluded(
         bandwidth=held.bandwidth,
         growth=growth,
     )
+
+
+def _paired(growth: Growth, noe: dict[str, float], noise_floor: float) -> bool:
+    """True when the grown model takes off the recordings held back what it took off the others: the noise is the same in both.
+
+    Beside the floor itself so little could not be seen.
+    """
+    promised = (growth.begin.left - growth.end.left) / max(growth.begin.floor, 1e-300)
+    return bool(growth.steps) and noe["refit"] - noe["augmented"] > _KEPT * promised * noise_floor
 
 
 def _withdrawn(growth: Growth, missing: bool) -> list[tuple[str, str]]:

@@ -9,22 +9,27 @@ without it, and with each rival in its place, everything is fitted anew. It ends
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..model import Model
 from .candidates import candidates, scales_of
 from .fitting import State, best_track, refit
-from .rivals import PER_PARAMETER, Rival, earns, rivals_of, worth
-from .screen import Tried, screen
-from .settle import Step, merged, settled
+from .rivals import BY_CHANCE, PER_PARAMETER, Rival, earns, rivals_of, worth
+from .screen import Screening, Tried, screen
+from .settle import Settled, Step, exchanged, merged, settled
 from .track import Track
 
 __all__ = ["Growth", "grow"]
 
 _AGAIN = 0.05  # of what is missing: with more left, other beginnings are tried
 _BEGINNINGS = 1  # of them
+_MANY = 3  # terms
 _MOST_TERMS = 4
 _LITTLE = 0.004  # of what is missing at the start: laws that differ in form only leave as much
+_FAINT = 0.04  # of the floor, and
+_DRAWS = 40.0  # times what one parameter takes off noise: so little may still be seen clearly
+_ALIKE = 0.8  # of what the best takes off: another that does tells that the cause can't be told
+_HARDLY = 0.5  # of what is missing: with more left, another observer may see what it is
 _SAME = 0.35  # of the floor: nothing is missing when less than this is left above it
 
 
@@ -73,7 +78,13 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
     tell = progress or (lambda _: None)
     start = best_track(tracks, nominal)
     best = _grown(tracks, start, None, tell)
-    if not best.steps or best.rest < _AGAIN:
+    if not best.steps or best.rest > _HARDLY:
+        faint = _faint(tracks, nominal, tell)
+        if faint is not None and faint.steps and (not best.steps or faint.rest < best.rest):
+            best = faint
+        if not best.steps:
+            return best
+    if _done(best):
         return best
     tried = {best.steps[0].term.split("#")[0]}
     for first in best.beginnings:
@@ -83,15 +94,66 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
             continue
         tried.add(first.effect.id)
         tell(f"once more, from {' and '.join(first.names)}")
-        other = _grown(tracks, start, first, tell)
+        other = _grown(tracks, start, first, tell, exchange=False)
         if other.steps and other.price < best.price:
-            best = other
-        if best.rest < _AGAIN:
+            best = _exchanged(other)
+        if _done(best):
             break
     return best
 
 
-def _grown(tracks: Sequence[Track], start: tuple[Track, State], first: Rival | None, tell: Callable[[str], None]) -> Growth:
+def _done(growth: Growth) -> bool:
+    """True when little is left by few terms: many have often come to mend a wrong first one."""
+    return growth.rest < _AGAIN and len(growth.steps) < _MANY
+
+
+def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth | None:
+    """The model grown by a term that an observer sees clearly although hardly anything is missing beside the noise.
+
+    A ripple or a resonance has a form of its own, which stands out from noise that holds many times its energy. None, where
+    no term does, or where several do alike.
+    """
+    best: tuple[float, Track, State, Screening] | None = None
+    for track in tracks:
+        state = refit(track, nominal)
+        found = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance)
+        if not found.tried or found.tried[0].gain < _chance_of(track, state, found.tried[:1]):
+            continue
+        clear = found.tried[0].gain / state.floor * track.independent
+        if best is None or clear > best[0]:
+            best = clear, track, state, found
+    if best is None:
+        return None
+    _, track, state, found = best
+    rivals = rivals_of(track, state, replace(found, pairs=()), scales_of(track))
+    gain = [max(state.left - rival.left, 0.0) for rival in rivals]
+    if not rivals or gain[0] < _chance_of(track, state, rivals[0].offer):
+        return None
+    others = [each for each, rival in zip(gain, rivals, strict=True) if rival.effect.id != rivals[0].effect.id]
+    if max(others, default=0.0) > _ALIKE * gain[0]:
+        return None
+    return _grown([track], (track, state), rivals[0], tell)
+
+
+def _chance_of(track: Track, state: State, tried: Sequence[Tried]) -> float:
+    """More than any candidate takes off by chance [F^2]."""
+    by_chance = max(each.by_chance for each in tried)
+    return max(state.floor * max(_FAINT, _DRAWS / track.independent), BY_CHANCE * by_chance)
+
+
+def _exchanged(growth: Growth) -> Growth:
+    """The same with each term held against its rivals beside all the others."""
+    done = exchanged(growth.track, Settled(growth.begin, growth.end, growth.steps, growth.rest, growth.rejected))
+    return replace(growth, begin=done.begin, end=done.state, steps=done.steps, rest=done.rest, rejected=done.gone)
+
+
+def _grown(
+    tracks: Sequence[Track],
+    start: tuple[Track, State],
+    first: Rival | None,
+    tell: Callable[[str], None],
+    exchange: bool = True,
+) -> Growth:
     """The model grown from ``start``, with ``first`` as its first step where it is given."""
     track, begin = start
     scales = scales_of(track)
@@ -130,4 +192,5 @@ def _grown(tracks: Sequence[Track], start: tuple[Track, State], first: Rival | N
             last = found.tried
             break
     done = settled(track, begin, state, steps)
-    return Growth(track, done.begin, done.state, done.steps, last, done.rest, done.gone, beginnings)
+    growth = Growth(track, done.begin, done.state, done.steps, last, done.rest, done.gone, beginnings)
+    return _exchanged(growth) if exchange else growth

@@ -13,7 +13,7 @@ from .fitting import State, bounds_of, fitted_with, unseen
 from .screen import Screening, Tried
 from .track import Fit, Track
 
-__all__ = ["OF_FLOOR", "PER_PARAMETER", "Rival", "earns", "name_of", "price_of", "rivals_of", "worth"]
+__all__ = ["BY_CHANCE", "OF_FLOOR", "PER_PARAMETER", "Rival", "earns", "name_of", "price_of", "rivals_of", "worth"]
 
 _PAIRS_FITTED = 2
 _PAIR_BETTER = 0.5  # of what the best single effect leaves, for a pair to be tried
@@ -22,7 +22,7 @@ _OTHER_LAWS = 2  # of the most promising effects are fitted in another law, too
 _FITTED = 4  # candidates that are fitted in full at each step
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
 _OF_EXCESS = 0.12  # and of what is missing: less is no explanation
-_BY_CHANCE = 6.0  # and times what candidates take off twins
+BY_CHANCE = 6.0  # and times what candidates take off twins
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,4 +107,4 @@ def earns(state: State, left: float, tried: Sequence[Tried]) -> bool:
     """True when leaving ``left`` is more than what ``tried`` takes off by chance, and a real part of what is missing."""
     gain = state.left - left
     chance = max((each.by_chance for each in tried), default=0.0)
-    return gain > max(OF_FLOOR * state.floor, _OF_EXCESS * state.excess, _BY_CHANCE * chance)
+    return gain > max(OF_FLOOR * state.floor, _OF_EXCESS * state.excess, BY_CHANCE * chance)

@@ -29,6 +29,7 @@ __all__ = ["Column", "Gram", "Promise", "Screening", "Tried", "blocks_of", "colu
 _BLOCKS = 10
 _KEPT = 2  # trials of a candidate that go from the quick columns to the observer's
 _TINY = 1e-10
+_VISIBLE = 1e-12  # of what is missing, the least that a trial changes
 _OWN = 0.02  # of a column, what the fit's own parameters must not be able to do
 _PAIRS = 5
 _FOREMOST = 2  # effects that are kept for what they promise along the motion
@@ -118,10 +119,9 @@ def restraint(track: Track, fit: Fit) -> float:
     """By what square a coefficient of the fit's Jacobian is held back [F^2]: as if it were known beforehand to its own size.
 
     It changes nothing where the recording tells a parameter, and keeps one that a block alone tells from running away without
-    that block, to where no first order holds. A low-passed residual holds about duration times bandwidth over two numbers.
+    that block, to where no first order holds.
     """
-    duration = float(sum(np.sum(run.step) for run in track.runs))
-    return float(fit.residual @ fit.residual) / max(0.5 * track.bandwidth * duration, 10.0)
+    return float(fit.residual @ fit.residual) / max(track.independent, 10.0)
 
 
 class Promise:
@@ -137,8 +137,10 @@ class Promise:
         self._model = fit.model
         self._able = along.can(fit.model)
         if self._able:
-            self._base = along.residual(fit.model)
-            columns = along.changes(fit.model, fit.names, fit.scale)
+            # A low-passed force needs no more rows than these for its projections.
+            self._rows = slice(None, None, along.stride)
+            self._base = along.residual(fit.model)[self._rows]
+            columns = along.changes(fit.model, fit.names, fit.scale)[self._rows]
             self._basis, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
             self._missing = self._base - self._basis @ (self._basis.T @ self._base)
         self.share: dict[str, float] = {}
@@ -156,7 +158,7 @@ class Promise:
 
     def _of(self, trial: Term) -> float:
         """What the trial takes off the sum of squares along the motion [F^2]."""
-        columns = np.stack([self._along.residual(self._model, part) - self._base for part in _parts(trial)], axis=1)
+        columns = np.stack([self._along.residual(self._model, part)[self._rows] - self._base for part in _parts(trial)], axis=1)
         whole = np.linalg.norm(columns, axis=0)
         columns = columns - self._basis @ (self._basis.T @ columns)
         size = np.linalg.norm(columns, axis=0)
@@ -264,7 +266,9 @@ def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: S
     able: list[tuple[Tried, list[int]]] = []
     promise: dict[int, float] = {}
     for column, place, whole in zip(columns, places, wholes, strict=True):
-        if not all(gram.total[k, k] > 1e-12 * gram.total[0, 0] for k in place):
+        # Of the trial, not of its unit, which may be millions of newtons per cubic metre.
+        units = [_value(column.term, name) for name in column.amplitudes] or [1.0]
+        if not all(gram.total[k, k] * unit**2 > _VISIBLE * gram.total[0, 0] for k, unit in zip(place, units, strict=True)):
             continue
         solved = gram.solved(0, refit + place)
         if not column.amplitudes and solved[n_free] <= 0.0:

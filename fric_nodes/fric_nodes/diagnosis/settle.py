@@ -12,13 +12,16 @@ from .candidates import Scales, candidates, scales_of
 from .fitting import State, bounds_of, free_names, refit
 from .rivals import OF_FLOOR, Rival, name_of, price_of, rivals_of
 from .screen import Tried, screen
-from .track import Track
+from .track import Track, Twin
 from .twin import twins
 from .universe import worth_trying
 
-__all__ = ["Settled", "Step", "audit", "merged", "settled"]
+__all__ = ["Settled", "Step", "audit", "exchanged", "merged", "settled"]
 
 _TO_STAY = 0.004  # of what is missing at the start, beside all other terms
+_AUDITED = 0.04  # of what is missing: with more left, it is looked at whether halves of the recordings tell the parameters
+_FLOOR_KNOWN = 0.1  # of itself, how well a floor is known
+_TWINS = 2
 _HOPELESS = 0.5  # of what is missing: with more left, no exchange of a term makes an explanation
 
 
@@ -67,20 +70,29 @@ class Settled:
 
 
 def settled(track: Track, begin: State, state: State, steps: list[Step]) -> Settled:
-    """Take away, exchange and audit the terms that ``steps`` brought."""
-    scales = scales_of(track)
+    """Take away what isn't needed of the terms that ``steps`` brought, and audit the rest."""
     begin = refit(track, begin.fit.model, max_iterations=6)
     state, steps, gone = _pruned(track, begin, state, steps)
     rest = audit(track, begin.fit.model, state.fit.model) if steps else 1.0
-    if len(steps) > 1 and rest < _HOPELESS:
-        state, steps = _exchanged(track, begin, state, steps, scales)
-        state, steps, more = _pruned(track, begin, state, steps)
-        gone += more
-        rest = audit(track, begin.fit.model, state.fit.model)
-    if rest > 1.0:
-        gone += [(step.term, "made what it was not fitted to worse") for step in steps]
-        state, steps, rest = begin, [], 1.0
-    return Settled(begin, state, tuple(steps), rest, tuple(gone))
+    return _unless_worse(Settled(begin, state, tuple(steps), rest, tuple(gone)))
+
+
+def exchanged(track: Track, done: Settled) -> Settled:
+    """Each term against its rivals with all the others there, where several explain most together."""
+    if len(done.steps) < 2 or done.rest > _HOPELESS:
+        return done
+    state, steps = _exchanged(track, done.begin, done.state, list(done.steps), scales_of(track))
+    state, steps, gone = _pruned(track, done.begin, state, steps)
+    rest = audit(track, done.begin.fit.model, state.fit.model)
+    return _unless_worse(Settled(done.begin, state, tuple(steps), rest, (*done.gone, *gone)))
+
+
+def _unless_worse(done: Settled) -> Settled:
+    """``done``, or nothing grown where that made worse what it was not fitted to."""
+    if done.rest <= 1.0:
+        return done
+    gone = [(step.term, "made what it was not fitted to worse") for step in done.steps]
+    return Settled(done.begin, done.begin, (), 1.0, (*done.gone, *gone))
 
 
 def merged(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step]]:
@@ -111,22 +123,34 @@ def merged(track: Track, begin: State, state: State, steps: list[Step]) -> tuple
 def audit(track: Track, begin: Model, end: Model) -> float:
     """Share of what ``begin`` lacks that ``end`` lacks too, both fitted to one half of the recordings and judged on the other.
 
-    The halves interleave: first and third quarter against second and fourth. The models follow the recordings from begin to
-    end both times: where a play or a contact stands at the start of a quarter, only what came before can tell. Above 1 the
-    grown model is the worse one.
+    Half of the recordings may tell a parameter badly, such as the period of a ripple; what that costs is no physics left out,
+    and is found on twins, which are treated alike. Above 1 the grown model is the worse one.
     """
-    n = track.residual(begin).shape[0]
-    first = (np.arange(n) * 4 // n) % 2 == 0
-    lacking = {"begin": 0.0, "end": 0.0}
-    for rows in (first, ~first):
-        for name, model in (("begin", begin), ("end", end)):
-            fitted = track.fit(model, free_names(model), 6, bounds_of(model, scales_of(track)), rows).model
-            left = track.residual(fitted)[~rows]
-            lacking[name] += float(left @ left)
-    made = [track.residual(end, twin) for twin in twins(track, end, 2)]
-    floor = float(np.mean([each @ each for each in made]))
+    made = twins(track, end, _TWINS)
+    floor = float(np.mean([float(np.sum(track.residual(end, twin) ** 2)) for twin in made]))
+    lacking, left = _on_other_half(track, begin), _on_other_half(track, end)
     unpaid = track.unpaid(begin) if end.has_slip_dynamics else 1.0
-    return unpaid * max(lacking["end"] - floor, 0.0) / max(lacking["begin"] - floor, 1e-300)
+    missing = max(lacking - floor, 1e-300)
+    if left - floor > _AUDITED * missing:
+        of_twins = float(np.mean([_on_other_half(track, end, twin) for twin in made]))
+        left -= max(of_twins - floor, 0.0)
+    return unpaid * max(left - (1.0 + _FLOOR_KNOWN) * floor, 0.0) / missing
+
+
+def _on_other_half(track: Track, model: Model, twin: Twin | None = None) -> float:
+    """Sum of squares that ``model`` lacks in each half of the recordings, or of their twin, when fitted to the other [F^2].
+
+    The halves interleave: first and third quarter against second and fourth. The model follows the recordings from begin to
+    end both times: where a play or a contact stands at the start of a quarter, only what came before can tell.
+    """
+    n = track.residual(model).shape[0]
+    first = (np.arange(n) * 4 // n) % 2 == 0
+    bounds = bounds_of(model, scales_of(track))
+    lacking = 0.0
+    for rows in (first, ~first):
+        fitted = track.fit(model, free_names(model), 6, bounds, rows, twin).model
+        lacking += float(np.sum(track.residual(fitted, twin)[~rows] ** 2))
+    return lacking
 
 
 def _effect_of(model: Model, name: str) -> Effect:

@@ -24,7 +24,7 @@ Source: the gains are those of the alpha-beta filter in :mod:`fric_nodes.identif
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -39,7 +39,7 @@ from ..record import Array, Index, Mask, Record
 from ..simulate import respond, substeps
 from .universe import universe_of
 
-__all__ = ["Motion", "Track", "Twin", "resolution", "smooth"]
+__all__ = ["Bounds", "Fit", "Motion", "Track", "Twin", "fitted_values", "resolution", "smooth"]
 
 _SMOOTH = 4.0  # times the bandwidth: of the motion along which a force is needed
 _STEP_OF_RATE = 0.2
@@ -48,6 +48,7 @@ _SETTLING = 6.0  # time constants of the observer that are dropped at the start 
 _MOST_GAIN = 2.5  # times gain and 2 alpha + beta; at 4 the pursuit of a mass begins to swing
 _LIGHTEST = 4.0  # times lighter than the mass whose impulses lead it, a model at most
 _NOTHING = np.zeros(1)
+_TINY = 1e-9  # of its scale, the least that a positive parameter may be
 _SHORTEST = 200  # samples of a run
 _SHAKEN = 0.4  # steps of the encoder that count as its noise
 _LARGEST = 1e6  # of the force range; a model that escapes must cost much, not break the solver
@@ -134,7 +135,7 @@ class Track:
                 time.append(record.time[first] + np.cumsum(run.step))
                 number.append(k)
                 noise.append(max(noise_of(run.position), _SHAKEN * resolution(run.position)))
-        mass = model.plant.total_inertia(*model.plant_values)
+        mass = model.total_inertia
         return cls(tuple(runs), tuple(time), tuple(number), bandwidth, mass, tuple(noise), _sizes(runs, mass))
 
     def with_run(self, run: Run, time: Array, record: int, noise: float) -> Track:
@@ -151,6 +152,11 @@ class Track:
     def starts(self) -> Index:
         """First residual of each run."""
         return np.cumsum([0, *(run.effort.shape[0] - self._settling(run) for run in self.runs)])[:-1]
+
+    @property
+    def independent(self) -> float:
+        """About how many independent numbers a residual holds: it is low-passed."""
+        return 0.5 * self.bandwidth * float(sum(np.sum(run.step) for run in self.runs))
 
     def _settling(self, run: Run) -> int:
         return int(min(max(math.ceil(_SETTLING / (self.bandwidth * run.sample_time)), 20), run.effort.shape[0] // 3))
@@ -177,27 +183,8 @@ class Track:
 
     def residual(self, model: Model, twin: Twin | None = None) -> Array:
         """The force that ``model`` lacks [F] at the end of each interval, shape ``(n,)``; on a ``twin`` of the recordings."""
-        universe = universe_of(model)
-        values = universe.values(model)
-        plant_values = np.array(model.plant_values)
         # The impulses are those of one mass, whatever mass the model has: a light model must not be led with less force.
-        inertia = model.plant.total_inertia(*model.plant_values)
-        mass = inertia if model.has_slip_dynamics else self.mass
-        parts = []
-        for k, run in enumerate(self.runs):
-            effort = run.effort if twin is None else twin.efforts[k]
-            extra = _NOTHING if twin is None else twin.extras[k]
-            position = run.position if twin is None else twin.positions[k]
-            alpha, beta = self.gains(run)
-            gain = min(mass / inertia, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
-            state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k))
-            found = np.empty(effort.shape[0])
-            universe.loops.pursue(
-                values, effort, extra, position, run.step, self.n_substeps(model, run), run.load, run.temperature,
-                alpha, beta, gain, self.noise[k], state, *universe.inner_states(model), found,
-            )  # fmt: skip
-            parts.append(mass * beta / run.sample_time**2 * found)
-        return self._finite(self.joined(parts))
+        return self._followed(model, model.total_inertia if model.has_slip_dynamics else self.mass, twin)
 
     def unpaid(self, model: Model) -> float:
         """By how much less energy ``model`` seems to lack when its position is set instead of pushed; at least 1.
@@ -206,22 +193,31 @@ class Track:
         """
         if model.has_slip_dynamics:
             return 1.0
+        pushed, put = self.residual(model), self._followed(model, None)
+        return max(float(pushed @ pushed) / max(float(put @ put), 1e-300), 1.0)
+
+    def _followed(self, model: Model, mass: float | None, twin: Twin | None = None) -> Array:
+        """The force that ``model`` lacks, pushed by the impulses of ``mass``; where that is None its position is set [F]."""
         universe = universe_of(model)
-        values = universe.values(model)
-        plant_values = np.array(model.plant_values)
-        inertia = model.plant.total_inertia(*model.plant_values)
+        values, plant_values = universe.values(model), np.array(model.plant_values)
+        inertia = model.total_inertia
         parts = []
         for k, run in enumerate(self.runs):
+            effort = run.effort if twin is None else twin.efforts[k]
+            extra = _NOTHING if twin is None else twin.extras[k]
+            position = run.position if twin is None else twin.positions[k]
             alpha, beta = self.gains(run)
             state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k))
-            found = np.empty(run.effort.shape[0])
-            universe.loops.observe(
-                values, run.effort, run.position, run.step, self.n_substeps(model, run), run.load, run.temperature,
-                alpha, beta, self.noise[k], state, *universe.inner_states(model), found,
-            )  # fmt: skip
-            parts.append(inertia * beta / run.sample_time**2 * found)
-        pushed, put = self.residual(model), self._finite(self.joined(parts))
-        return max(float(pushed @ pushed) / max(float(put @ put), 1e-300), 1.0)
+            found = np.empty(effort.shape[0])
+            around = run.step, self.n_substeps(model, run), run.load, run.temperature, alpha, beta
+            last = state, *universe.inner_states(model), found
+            if mass is None:
+                universe.loops.observe(values, effort, position, *around, self.noise[k], *last)
+            else:
+                gain = min(mass / inertia, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
+                universe.loops.pursue(values, effort, extra, position, *around, gain, self.noise[k], *last)
+            parts.append((inertia if mass is None else mass) * beta / run.sample_time**2 * found)
+        return self._finite(self.joined(parts))
 
     def needed(self, model: Model, extra: Term | None = None) -> Array:
         """As :meth:`residual`, by the force that ``model``, with the term ``extra``, needs along the measured motion [F]."""
@@ -304,38 +300,32 @@ class Track:
         max_iterations: int = 12,
         bounds: Bounds | None = None,
         rows: Mask | None = None,
+        twin: Twin | None = None,
     ) -> Fit:
-        """``model`` with the parameters ``names`` such that it lacks the least force; in ``rows`` of it only, where given."""
-        index = np.array([model.names.index(name) for name in names], dtype=np.int64)
-        declared = [parameter.declaration for parameter in model.parameters()]
-        values = model.values
+        """``model`` with the parameters ``names`` such that it lacks the least force, by default everywhere.
+
+        Args:
+            model: to begin with.
+            names: of the free parameters.
+            max_iterations: of the fit.
+            bounds: of some of them.
+            rows: of the residual, the only ones that count.
+            twin: of the recordings, to be fitted in their place.
+        """
         scale = self.scale(model, names)
-        tiny = 1e-9
-        lower = np.array(
-            [max(declared[k].lower, tiny * s if declared[k].positive else -np.inf) for k, s in zip(index, scale, strict=True)]
-        )
-        upper = np.array([declared[k].upper for k in index])
-        if bounds is not None:
-            for k, name in enumerate(names):
-                low, high = bounds.get(name, (-np.inf, np.inf))
-                lower[k], upper[k] = max(lower[k], low), min(upper[k], high)
-
-        def at(point: Array) -> Model:
-            trial = values.copy()
-            trial[index] = point * scale
-            return model.with_values(trial)
-
-        answer = minimise(
-            lambda point: self.residual(at(point)) if rows is None else self.residual(at(point))[rows],
-            values[index] / scale,
-            lower / scale,
-            upper / scale,
+        found, answer = fitted_values(
+            lambda trial: self.residual(trial, twin) if rows is None else self.residual(trial, twin)[rows],
+            model,
+            names,
+            scale,
+            bounds or {},
             difference=5e-3,  # smaller ones see single sticks and slips instead of their trend
             point_tolerance=1e-4,
             cost_tolerance=1e-5,
             max_iterations=max_iterations,
+            secant=True,
         )
-        return Fit(at(answer.point), tuple(names), answer, scale)
+        return Fit(found, tuple(names), answer, scale)
 
 
 def _sizes(runs: Sequence[Run], mass: float) -> dict[str, float]:
@@ -357,6 +347,37 @@ def _sizes(runs: Sequence[Run], mass: float) -> dict[str, float]:
 
 
 Bounds = dict[str, tuple[float, float]]
+
+
+def fitted_values(
+    residual: Callable[[Model], Array], model: Model, names: Sequence[str], scale: Array, bounds: Bounds, **how: Any
+) -> tuple[Model, Solution]:
+    """``model`` with the parameters ``names`` such that the ``residual`` is least, and the solution in units of ``scale``.
+
+    Args:
+        residual: of a model [F], shape ``(n,)``.
+        model: to begin with.
+        names: of the free parameters.
+        scale: of each of them.
+        bounds: of some of them, beside those that they were declared with.
+        how: tolerances and limits of :func:`fric_nodes.identification.gauss_newton.minimise`.
+    """
+    index = np.array([model.names.index(name) for name in names], dtype=np.int64)
+    declared = [parameter.declaration for parameter in model.parameters()]
+    lower, upper = np.empty(index.shape[0]), np.empty(index.shape[0])
+    for k, name in enumerate(names):
+        p = declared[index[k]]
+        low, high = bounds.get(name, (-np.inf, np.inf))
+        lower[k], upper[k] = max(p.lower, low, _TINY * scale[k] if p.positive else -np.inf), min(p.upper, high)
+    values = model.values
+
+    def at(point: Array) -> Model:
+        trial = values.copy()
+        trial[index] = point * scale
+        return model.with_values(trial)
+
+    answer = minimise(lambda point: residual(at(point)), values[index] / scale, lower / scale, upper / scale, **how)
+    return at(answer.point), answer
 
 
 @dataclass(frozen=True, eq=False)

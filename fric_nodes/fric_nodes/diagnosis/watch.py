@@ -87,7 +87,7 @@ class Follower:
         z = math.exp(-bandwidth * step)
         self._model = model
         self._gains = 1.0 - z * z, (1.0 - z) ** 2
-        self._scale = model.plant.total_inertia(*model.plant_values) * self._gains[1] / step**2
+        self._scale = model.total_inertia * self._gains[1] / step**2
         self._substeps = min(substeps(model, step, _STEP_OF_RATE), 60)
         self._values, self._plant_values = model.values, np.array(model.plant_values)
         self.settling = math.ceil(_SETTLING / bandwidth / _BLOCK) + 1

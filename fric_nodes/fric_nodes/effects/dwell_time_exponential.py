@@ -14,7 +14,7 @@ import math
 from ..effect import Context, Effect, Place
 from ..engine.kernel import kernel
 from ..parameter import Parameter
-from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
+from ..steps.ageing import CREEP_LENGTH, FRESH_SURPLUS, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 
 __all__ = ["EFFECT"]
 
@@ -45,17 +45,7 @@ EFFECT = Effect(
     source="Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 34",
     parameters=(
         Parameter("force", "S_inf", "F", "surplus over the other terms' level after a long rest", lower=0.0, linear=True),
-        # Not to be told from the level of another term by any motion, and so left alone unless it is asked for.
-        Parameter(
-            "initial",
-            "S_0",
-            "F",
-            "surplus over the other terms' level of a fresh contact",
-            lower=0.0,
-            default=0.0,
-            linear=True,
-            shape=True,
-        ),
+        FRESH_SURPLUS,
         Parameter("time", "tau", "s", "time over which the contact strengthens", positive=True),
         Parameter("exponent", "beta", "1", "shape of the rise", lower=0.05, upper=5.0, default=1.0, shape=True),
         CREEP_LENGTH,

@@ -12,7 +12,7 @@ from __future__ import annotations
 from ..effect import Context, Effect, Place
 from ..engine.kernel import kernel
 from ..parameter import Parameter
-from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
+from ..steps.ageing import CREEP_LENGTH, FRESH_SURPLUS, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 
 __all__ = ["EFFECT"]
 
@@ -42,17 +42,7 @@ EFFECT = Effect(
     source="Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 36",
     parameters=(
         Parameter("force", "S_inf", "F", "surplus over the other terms' level after a long rest", lower=0.0, linear=True),
-        # Not to be told from the level of another term by any motion, and so left alone unless it is asked for.
-        Parameter(
-            "initial",
-            "S_0",
-            "F",
-            "surplus over the other terms' level of a fresh contact",
-            lower=0.0,
-            default=0.0,
-            linear=True,
-            shape=True,
-        ),
+        FRESH_SURPLUS,
         Parameter("time", "tau", "s", "time in which half of the rise is done", positive=True),
         CREEP_LENGTH,
     ),

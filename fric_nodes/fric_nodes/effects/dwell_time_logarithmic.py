@@ -15,7 +15,7 @@ import math
 from ..effect import Context, Effect, Place
 from ..engine.kernel import kernel
 from ..parameter import Parameter
-from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
+from ..steps.ageing import CREEP_LENGTH, FRESH_SURPLUS, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
 
 __all__ = ["EFFECT"]
 
@@ -43,17 +43,7 @@ EFFECT = Effect(
     source="Al-Bender, Lampaert, Swevers 2004, Appendix I, Eq. 39",
     parameters=(
         Parameter("force", "S_e", "F", "rise of the surplus with every factor e of the age", lower=0.0, linear=True),
-        # Not to be told from the level of another term by any motion, and so left alone unless it is asked for.
-        Parameter(
-            "initial",
-            "S_0",
-            "F",
-            "surplus over the other terms' level of a fresh contact",
-            lower=0.0,
-            default=0.0,
-            linear=True,
-            shape=True,
-        ),
+        FRESH_SURPLUS,
         Parameter("time", "tau", "s", "age at which the rise turns logarithmic", positive=True),
         CREEP_LENGTH,
     ),

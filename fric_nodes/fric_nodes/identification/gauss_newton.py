@@ -7,7 +7,8 @@ Gauss-Newton steps with Levenberg-Marquardt damping on the normal equations, col
 bounds by an active set: a component that would leave is put on its bound and the rest solved again. The damping follows the
 ratio of actual to predicted decrease (Nielsen 1999). A step needs only sums over the residuals, so that an iteration costs its
 n_parameters + 1 evaluations and little else; decomposing the whole Jacobian costs more than the simulations that it comes from.
-Source: Madsen, Nielsen, Tingleff 2004, section 3.2; the active set is that of Bertsekas 1982 for simple bounds.
+Where evaluations are dear, every other Jacobian may be Broyden's secant update of the one before, which costs none.
+Source: Madsen, Nielsen, Tingleff 2004, sections 3.2 and 3.4; the active set is that of Bertsekas 1982 for simple bounds.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ __all__ = ["Solution", "minimise"]
 _REACH = 0.7
 _REACH_FROM_ZERO = 0.3
 _FIRST_DAMPING = 1e-5
+_FORESEEN = 0.5  # of a decrease, by which it may miss the promise
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +58,7 @@ def minimise(
     cost_tolerance: float = 1e-8,
     max_iterations: int = 60,
     most_slow: int = 0,
+    secant: bool = False,
 ) -> Solution:
     """The point within bounds at which the sum of squares of ``function`` is smallest, near ``start``.
 
@@ -69,6 +72,7 @@ def minimise(
         cost_tolerance: relative decrease, predicted by the linear model, at which to stop.
         most_slow: number of steps in a row that decrease the cost by less than that, at which to stop; 0: no such limit.
         max_iterations: limit.
+        secant: True to take differences at every other point only, where the step to it went as foreseen.
     """
     point = np.clip(start, lower, upper)
     residual = function(point)
@@ -76,8 +80,11 @@ def minimise(
     damping, growth = _FIRST_DAMPING, 2.0
     slow = 0  # steps in a row that gained nearly nothing, as where differences can't see the minimum any better
     jacobian = np.empty((residual.shape[0], point.shape[0]))
+    exact, foreseen = False, False  # the Jacobian at this point, and the step that led to it
     for iteration in range(1, max_iterations + 1):
-        _differences(function, point, residual, upper, difference, jacobian)
+        exact = not (secant and exact and foreseen)
+        if exact:
+            _differences(function, point, residual, upper, difference, jacobian)
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
         for _ in range(30):
             step = _proposal(normal, gradient, damping, point, lower, upper)
@@ -85,6 +92,8 @@ def minimise(
             promised = -float(step @ (2.0 * gradient + normal @ step))
             small = np.all(np.abs(step) <= point_tolerance * (np.abs(point) + point_tolerance))
             if small or 0 < most_slow <= slow or 0.0 <= promised <= cost_tolerance * cost:
+                if not exact:
+                    _differences(function, point, residual, upper, difference, jacobian)
                 return Solution(point, residual, jacobian, True, iteration)
             if promised < 0.0:
                 # A bound has bent the step uphill; a shorter one goes along the gradient.
@@ -96,12 +105,19 @@ def minimise(
             gain = (cost - trial_cost) / promised
             if gain > 0.0:
                 slow = slow + 1 if cost - trial_cost <= cost_tolerance * cost else 0
+                foreseen = abs(gain - 1.0) < _FORESEEN
+                if secant and exact and foreseen:
+                    moved = trial - point
+                    jacobian += np.outer(trial_residual - residual - jacobian @ moved, moved / (moved @ moved))
                 point, residual, cost = trial, trial_residual, trial_cost
                 damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 1e-12)
                 growth = 2.0
                 break
             damping *= growth
             growth *= 2.0
+            if not exact:
+                _differences(function, point, residual, upper, difference, jacobian)
+                normal, gradient, exact = jacobian.T @ jacobian, jacobian.T @ residual, True
         else:
             # No direction goes down: the differences have said all they can.
             return Solution(point, residual, jacobian, True, iteration)

@@ -20,10 +20,22 @@ from ..engine.kernel import kernel
 from ..parameter import Parameter
 from .first_order import mean_decay
 
-__all__ = ["CREEP_LENGTH", "LOOKS_LIKE", "REGIME", "age", "grow_older", "renewal_rate"]
+__all__ = ["CREEP_LENGTH", "FRESH_SURPLUS", "LOOKS_LIKE", "REGIME", "age", "grow_older", "renewal_rate"]
 
 CREEP_LENGTH = Parameter("length", "D_0", "x", "creep length: sliding by it renews the contacts", positive=True)
 """The parameter that every law of the contact's age shares."""
+
+FRESH_SURPLUS = Parameter(
+    "initial",
+    "S_0",
+    "F",
+    "surplus over the other terms' level of a fresh contact",
+    lower=0.0,
+    default=0.0,
+    linear=True,
+    shape=True,
+)
+"""Not to be told from the level of another term by any motion, and so left alone unless it is asked for."""
 
 REGIME = "the first moment of motion after a rest: the longer the rest, the higher the peak; and low speed"
 
