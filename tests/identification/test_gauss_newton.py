@@ -62,3 +62,23 @@ def test_the_limit_of_iterations_is_told() -> None:
     found = minimise(residual, np.array([-1.2, 1.0]), -FREE, FREE, max_iterations=2)
     assert not found.converged
     assert found.iterations == 2
+
+
+def test_secants_reach_the_same_minimum_with_fewer_evaluations() -> None:
+    time = np.linspace(0.0, 4.0, 300)
+    truth = np.array([2.0, 0.7, 5.0, 0.3])
+    count = {False: 0, True: 0}
+
+    def run(secant: bool) -> Array:
+        def residual(x: Array) -> Array:
+            count[secant] += 1
+            return x[0] * np.exp(-x[1] * time) * np.cos(x[2] * time + x[3]) - target
+
+        target = truth[0] * np.exp(-truth[1] * time) * np.cos(truth[2] * time + truth[3])
+        target = target + 0.05 * np.random.default_rng(3).standard_normal(300)
+        free = np.full(4, np.inf)
+        return minimise(residual, np.array([1.0, 1.0, 4.6, 0.8]), -free, free, secant=secant, cost_tolerance=1e-12).point
+
+    np.testing.assert_allclose(run(True), run(False), rtol=1e-4)
+    np.testing.assert_allclose(run(True), truth, rtol=0.1)
+    assert count[True] / 2 < count[False]  # it was run twice

@@ -33,6 +33,7 @@ from .fitting import best_track, bounds_of, free_names, refit
 from .grow import Growth, grow
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
+from .rivals import FAR_OFF, implausible
 from .screen import Tried
 from .settle import Step
 from .track import Fit, Track
@@ -210,13 +211,15 @@ def _concluded(
     rest = min(max(growth.rest, seen_rest), 1.0) if missing else 0.0
     findings = [_finding(validation, held, growth, end, step, scored, scales, rest) for step in growth.steps]
     likely, stand_in = None, False
-    if missing and (rest > _SIGNED or not findings):
+    # What needs a mass twice or half as large as the given one is no explanation.
+    far_off = min(implausible(mass, end) for mass in (track.mass, nominal.total_inertia)) > FAR_OFF
+    if missing and (rest > _SIGNED or not findings or far_off):
         likely, of_all = _signature_of(tracks, growth, rest)
         # Where one signature explains more than several effects do together, these have only stood in for it.
         stand_in = of_all and len(findings) > 1
     most = _UNEXPLAINED if len(findings) < _MANY else _SIGNED
     unsure = _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300)
-    unknown = missing and (rest > min(most + unsure, _HARDLY) or not findings or stand_in)
+    unknown = missing and (rest > min(most + unsure, _HARDLY) or not findings or stand_in or far_off)
     unexplained = Unexplained(rest, None)
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
         where = _where_left(held, left["augmented"], floor, scales, end)

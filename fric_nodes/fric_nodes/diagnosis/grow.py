@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from ..model import Model
 from .candidates import candidates, scales_of
 from .fitting import State, best_track, refit
-from .rivals import BY_CHANCE, PER_PARAMETER, Rival, earns, rivals_of, worth
+from .rivals import BY_CHANCE, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
 from .screen import Screening, Tried, screen
 from .settle import Settled, Step, exchanged, merged, settled
 from .track import Track
@@ -61,7 +61,7 @@ class Growth:
     def price(self) -> float:
         """What is left, and a price for each parameter, by which grown models are compared."""
         n = sum(not p.shape for held in self.end.fit.model.terms for p in held.effect.parameters)
-        return self.rest + PER_PARAMETER * n
+        return self.rest + PER_PARAMETER * n + implausible(self.track.mass, self.end.fit.model)
 
 
 def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None] | None = None) -> Growth:
@@ -117,18 +117,20 @@ def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None])
     for track in tracks:
         state = refit(track, nominal)
         found = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance)
-        if not found.tried or found.tried[0].gain < _chance_of(track, state, found.tried[:1]):
+        clear = tuple(each for each in found.tried if each.gain > _chance_of(track, state, (each,)))
+        if not clear:
             continue
-        clear = found.tried[0].gain / state.floor * track.independent
-        if best is None or clear > best[0]:
-            best = clear, track, state, found
+        surprise = clear[0].gain / state.floor * track.independent
+        if best is None or surprise > best[0]:
+            best = surprise, track, state, replace(found, tried=clear, laws=(), pairs=(), foremost=())
     if best is None:
         return None
     _, track, state, found = best
-    rivals = rivals_of(track, state, replace(found, pairs=()), scales_of(track))
-    gain = [max(state.left - rival.left, 0.0) for rival in rivals]
-    if not rivals or gain[0] < _chance_of(track, state, rivals[0].offer):
+    rivals = rivals_of(track, state, found, scales_of(track))
+    rivals = [rival for rival in rivals if state.left - rival.left > _chance_of(track, state, rival.offer)]
+    if not rivals:
         return None
+    gain = [max(state.left - rival.left, 0.0) for rival in rivals]
     others = [each for each, rival in zip(gain, rivals, strict=True) if rival.effect.id != rivals[0].effect.id]
     if max(others, default=0.0) > _ALIKE * gain[0]:
         return None
@@ -169,8 +171,8 @@ def _grown(
             last = found.tried
             if len(steps) >= _MOST_TERMS or (state.excess < _SAME * state.floor and not worth(state, found.tried)):
                 break
-            rivals = rivals_of(track, state, found, scales)
-            if not rivals or not earns(state, rivals[0].left, rivals[0].offer):
+            rivals = [rival for rival in rivals_of(track, state, found, scales) if earns(state, rival.left, rival.offer)]
+            if not rivals:
                 break
         best = rivals[0]
         beginnings = beginnings or tuple(rivals[1:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,8 +14,20 @@ from .fitting import State, bounds_of, fitted_with, unseen
 from .screen import Screening, Tried
 from .track import Fit, Track
 
-__all__ = ["BY_CHANCE", "OF_FLOOR", "PER_PARAMETER", "Rival", "earns", "name_of", "price_of", "rivals_of", "worth"]
+__all__ = [
+    "BY_CHANCE",
+    "OF_FLOOR",
+    "PER_PARAMETER",
+    "Rival",
+    "earns",
+    "implausible",
+    "name_of",
+    "price_of",
+    "rivals_of",
+    "worth",
+]
 
+FAR_OFF = 0.1  # of what is missing, for a mass twice or half the one that was given
 _PAIRS_FITTED = 2
 _PAIR_BETTER = 0.5  # of what the best single effect leaves, for a pair to be tried
 PER_PARAMETER = 0.012  # of what is missing
@@ -82,7 +95,7 @@ def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, found
     effects = [each.column.term.effect for each in offer]
     slips = any(effect.slip is not None for effect in effects)
     left = unseen(track, fit, fit.residual) * (found.unpaid if slips else 1.0)
-    dear = sum(price_of(effect, state.excess) for effect in effects)
+    dear = sum(price_of(effect, state.excess) for effect in effects) + state.excess * implausible(track.mass, fit.model)
     names = [name_of(fit.model, effect) for effect in effects]
     halfway = min((each.left for each in offer), default=left)
     return Rival(effects[0], left, fit, left + dear, offer, tuple(names), max(halfway, left), found.tried)
@@ -91,6 +104,15 @@ def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, found
 def price_of(effect: Effect, excess: float) -> float:
     """What the parameters of ``effect`` cost [F^2]."""
     return PER_PARAMETER * excess * sum(not p.shape for p in effect.parameters)
+
+
+def implausible(mass: float, model: Model) -> float:
+    """What it speaks against ``model`` to be far from a ``mass`` [F s^2/x] that was given, as a share of what is missing.
+
+    A body that is far too light under a force that is taken away from it lacks little, whatever the machine does.
+    """
+    appended = sum(p.value for p in model.parameters() if "." in p.name and p.declaration.dimension == "F s^2/x")
+    return FAR_OFF * math.log2((model.total_inertia + appended) / mass) ** 2
 
 
 def name_of(model: Model, effect: Effect) -> str:

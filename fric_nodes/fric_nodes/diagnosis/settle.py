@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effect import Effect
 from ..model import Model, Term
 from .candidates import Scales, candidates, scales_of
 from .fitting import State, bounds_of, free_names, refit
-from .rivals import OF_FLOOR, Rival, name_of, price_of, rivals_of
+from .rivals import OF_FLOOR, Rival, implausible, name_of, price_of, rivals_of
 from .screen import Tried, screen
 from .track import Track, Twin
 from .twin import twins
@@ -153,9 +152,10 @@ def _on_other_half(track: Track, model: Model, twin: Twin | None = None) -> floa
     return lacking
 
 
-def _effect_of(model: Model, name: str) -> Effect:
-    """The effect of the term ``name``."""
-    return model.terms[list(model.prefixes).index(name)].effect
+def _price(track: Track, model: Model, name: str, excess: float) -> float:
+    """What the term ``name`` of ``model`` costs, as rivals pay it [F^2]."""
+    effect = model.terms[list(model.prefixes).index(name)].effect
+    return price_of(effect, excess) + excess * implausible(track.mass, model)
 
 
 def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scales: Scales) -> tuple[State, list[Step]]:
@@ -170,15 +170,13 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         rivals = [
             rival for rival in rivals_of(track, without, replace(found, pairs=()), scales) if rival.effect.id != effect_id
         ]
-        own = state.left + price_of(
-            state.fit.model.terms[list(state.fit.model.prefixes).index(step.term)].effect, without.excess
-        )
+        own = state.left + _price(track, state.fit.model, step.term, without.excess)
         if rivals and own - rivals[0].score > max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
             state = refit(track, rivals[0].fit.model, max_iterations=6)
             term, rivals = rivals[0].names[0], rivals[1:]
         else:
             term = step.term
-        price = price_of(_effect_of(state.fit.model, term), without.excess)
+        price = _price(track, state.fit.model, term, without.excess)
         beside = without.left, state.left, without.floor, without.excess
         steps[k] = Step(term, *beside, tuple(rivals), found.tried, price)
     return state, steps

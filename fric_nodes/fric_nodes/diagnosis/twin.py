@@ -55,7 +55,7 @@ def twins(track: Track, model: Model, n_twins: int, seed: int = 1) -> list[Twin]
 def _noisy(runs: Sequence[Run], led: Sequence[tuple[Array, Array, Array]], random: np.random.Generator) -> Twin:
     efforts, positions = [], []
     for run, (there, _, given) in zip(runs, led, strict=True):
-        efforts.append(given + noise_of(run.effort) * random.standard_normal(given.shape[0]))
+        efforts.append(given + run.force_noise(random))
         step = resolution(run.position)
         # What the steps of the encoder don't explain of the noise is the sensor's own.
         own = math.sqrt(max(noise_of(run.position) ** 2 - step**2 / 12.0, 0.0))

@@ -176,6 +176,8 @@ def _follower(model: Model, stretch: Stretch) -> _Follower:
         load=load,
         temperature=temperature,
         noise=noise_of(stretch.raw_position),
+        effort_noise=noise_of(stretch.effort),
+        hold=stretch.hold,
     )
     n_substeps = substeps(model, h)
     index = min(_INDICES, key=lambda trial: float(np.sum(innovations(model, [run], trial, n_substeps) ** 2)))

@@ -40,6 +40,8 @@ class Run:
         load: relative normal load, one value or ``(n,)``.
         temperature: difference from reference [K], one value or ``(n,)``.
         noise: of the position signal [x].
+        effort_noise: of the recorded force at each sample [F]; that of an interval between two samples is another.
+        hold: how the force over an interval comes from those at the samples, see :func:`fric_nodes.simulate.intervals`.
     """
 
     step: Array
@@ -49,6 +51,8 @@ class Run:
     load: Array
     temperature: Array
     noise: float
+    effort_noise: float
+    hold: str
 
     @cached_property
     def sample_time(self) -> float:
@@ -64,7 +68,19 @@ class Run:
             begin = (before, float((position[0] - before) / self.step[first]))
         load = self.load[first:last] if self.load.shape[0] > 1 else self.load
         temperature = self.temperature[first:last] if self.temperature.shape[0] > 1 else self.temperature
-        return Run(self.step[first:last], self.effort[first:last], position, begin, load, temperature, self.noise)
+        return replace(
+            self,
+            step=self.step[first:last],
+            effort=self.effort[first:last],
+            position=position,
+            start=begin,
+            load=load,
+            temperature=temperature,
+        )
+
+    def force_noise(self, random: np.random.Generator) -> Array:
+        """Noise as strong as that of the recorded force, over each interval [F], shape ``(n,)``."""
+        return intervals(self.effort_noise * random.standard_normal(self.effort.shape[0] + 1), self.hold)
 
     def moved(self, effort: Array, position: Array) -> Run:
         """The same with ``effort`` [F] and ``position`` [x] added to the signals, shape ``(n,)`` each."""
@@ -90,6 +106,8 @@ def runs_of(record: Record) -> list[Run]:
                 load=load[first : last - 1] if load.shape[0] > 1 else load,
                 temperature=temperature[first : last - 1] if temperature.shape[0] > 1 else temperature,
                 noise=noise_of(position),
+                effort_noise=noise_of(record.effort[first:last]),
+                hold=record.effort_hold,
             )
         )
     return found

@@ -50,7 +50,7 @@ from .conclusion import Fitted, concluded, standard_errors
 from .equations import Equations
 from .free_parameters import FreeParameters, candidates
 from .gauss_newton import Solution, minimise
-from .innovations import SETTLING, Run, excerpt, innovations, noise_of, runs_of
+from .innovations import SETTLING, Run, excerpt, innovations, runs_of
 from .problem import Problem
 from .result import Identification, Method, Options
 from .statistics import bartlett_lag, by_parts, definite, parts_of
@@ -209,10 +209,8 @@ def _with_noise(runs: Sequence[Run], force_share: float) -> list[list[Run]]:
     for _ in range(_DRAWS):
         up, down = [], []
         for run in runs:
-            n = run.effort.shape[0]
-            white = random.standard_normal((2, n))
-            effort: Array = math.sqrt(force_share) * noise_of(run.effort) * white[0]
-            position: Array = run.noise * white[1]
+            effort: Array = run.force_noise(random) * math.sqrt(force_share)
+            position: Array = run.noise * random.standard_normal(run.effort.shape)
             up.append(run.moved(effort, position))
             down.append(run.moved(-effort, -position))
         drawn += [up, down]
@@ -223,7 +221,7 @@ def _share_that_is_noise(model: Model, runs: Sequence[Run], index: float, n_subs
     """How much of the fast part of the recorded force did not act, as a share of its power."""
     without = []
     for run in runs:
-        limit = 4.0 * noise_of(run.effort)
+        limit = 4.0 * run.effort_noise
         fast = np.clip(run.effort - savgol_filter(run.effort, 7, 3), -limit, limit)
         without.append(run.moved(-fast, np.zeros_like(fast)))
     left = innovations(model, runs, index, n_substeps)
