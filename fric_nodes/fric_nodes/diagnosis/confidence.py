@@ -34,4 +34,4 @@ def confidence_of(rest: float, step: Step) -> float:
 
 def unknown_confidence(rest: float) -> float:
     """Probability that no known effect explains what is left."""
-    return round(0.88 + 0.1 * min(max(rest, 0.0), 1.0), 4)
+    return round(0.8 + 0.05 * min(max(rest, 0.0), 1.0), 4)
