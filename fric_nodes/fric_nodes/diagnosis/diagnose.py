@@ -51,7 +51,7 @@ _UNEXPLAINED = 0.15  # of what was missing: with more left, something unknown re
 _FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is missing is known the worse
 _MANY = 3  # effects at once that still leave something are more likely to have stood in for one
 _SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
-_HARDLY = 0.6  # with more than this left, what was found is no explanation and is not named
+_HARDLY = 0.6  # with more than this left, something unknown remains however little is known of the floor
 _FIRST_FIT = 6  # iterations, by which starts are compared
 _STANDS_OUT = 10.0  # times the floor
 _LOCATING = 300.0  # [rad/s], for spans of time
@@ -185,7 +185,7 @@ def _concluded(
 ) -> Diagnosis:
     track = growth.track
     begin, end = growth.begin.fit.model, _with_errors(track, growth.end.fit)
-    held = _shown(validation, track, begin)
+    held = _shown(validation, track, begin, growth.beyond > 0.0)
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
     spread = _spread(held)
     # A grown model that sticks and slips where the axis doesn't has twins that say nothing: the quieter ones count.
@@ -213,19 +213,21 @@ def _concluded(
     likely, stand_in = None, False
     # What needs a mass twice or half as large as the given one is no explanation.
     far_off = min(implausible(mass, end) for mass in (track.mass, nominal.total_inertia)) > FAR_OFF
-    if missing and (rest > _SIGNED or not findings or far_off):
+    if missing and (rest > _SIGNED or not findings or far_off or growth.beyond > 0.0):
         likely, of_all = _signature_of(tracks, growth, rest)
         # Where one signature explains more than several effects do together, these have only stood in for it.
         stand_in = of_all and len(findings) > 1
     most = _UNEXPLAINED if len(findings) < _MANY else _SIGNED
     unsure = _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300)
-    unknown = missing and (rest > min(most + unsure, _HARDLY) or not findings or stand_in or far_off)
-    unexplained = Unexplained(rest, None)
+    unknown = missing and (rest > min(most + unsure, _HARDLY) or not findings or stand_in or far_off or growth.beyond > 0.0)
+    unexplained = Unexplained(max(rest, growth.beyond if missing else 0.0), None)
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
         where = _where_left(held, left["augmented"], floor, scales, end)
-        unexplained = Unexplained(rest, where)
+        unexplained = Unexplained(max(rest, growth.beyond), where)
         if likely is not None and unknown:
-            findings = [_unknown(where, likely, growth, scored, rest), *([] if rest > _HARDLY or stand_in else findings)]
+            # What helps is told all the same, as sure as such findings were right when so much was left.
+            found = sorted(findings, key=lambda each: -each.confidence)
+            findings = [_unknown(where, likely, growth, scored, unexplained.share), *found]
     return Diagnosis(
         mismatch=missing,
         checks=tuple(checks),
@@ -239,7 +241,7 @@ def _concluded(
         refit=begin,
         given=nominal,
         prediction=tuple(_predictions(validation, held, left)),
-        notes=tuple(corrected),
+        notes=(*corrected, *_beyond(growth)),
         bandwidth=held.bandwidth,
         growth=growth,
     )
@@ -254,16 +256,27 @@ def _paired(growth: Growth, noe: dict[str, float], noise_floor: float) -> bool:
     return bool(growth.steps) and noe["refit"] - noe["augmented"] > _KEPT * promised * noise_floor
 
 
+def _beyond(growth: Growth) -> list[str]:
+    """What is to be said where the effects named are those of a slow observer."""
+    if growth.beyond == 0.0:
+        return []
+    return [
+        f"the effects named explain what is missing up to about {growth.track.bandwidth:.3g} rad/s; of what a faster observer "
+        f"sees {100.0 * growth.beyond:.3g} % stays unexplained"
+    ]
+
+
 def _withdrawn(growth: Growth, missing: bool) -> list[tuple[str, str]]:
     """Terms that the recordings held back speak against, with the reason."""
     why = "makes the recordings held back worse" if missing else "the recordings held back show no mismatch"
     return [(step.term.split("#")[0], why) for step in growth.steps]
 
 
-def _shown(validation: Sequence[Record], track: Track, begin: Model) -> Track:
-    """The validation recordings, followed as fast as what is missing still stands out from the floor."""
+def _shown(validation: Sequence[Record], track: Track, begin: Model, as_track: bool) -> Track:
+    """The validation recordings, followed as fast as what is missing still stands out from the floor, or ``as_track`` is."""
     step = max(record.sample_time for record in validation)
-    for bandwidth in sorted({min(w, _FAST / step) for w in (*_BANDWIDTHS, track.bandwidth)}, reverse=True):
+    tried = (track.bandwidth,) if as_track else (*_BANDWIDTHS, track.bandwidth)
+    for bandwidth in sorted({min(w, _FAST / step) for w in tried}, reverse=True):
         held = replace(Track.of(validation, bandwidth, begin), mass=track.mass)
         if not held.runs:
             raise DiagnosisError(validation[0].source, "has no valid part of 200 samples", "record for longer")

@@ -26,6 +26,7 @@ _BEGINNINGS = 1  # of them
 _MANY = 3  # terms
 _MOST_TERMS = 4
 _LITTLE = 0.004  # of what is missing at the start: laws that differ in form only leave as much
+_FAINTLY = 3.0  # floors: no more is missing where a faint term is looked for
 _FAINT = 0.04  # of the floor, and
 _DRAWS = 40.0  # times what one parameter takes off noise: so little may still be seen clearly
 _ALIKE = 0.8  # of what the best takes off: another that does tells that the cause can't be told
@@ -46,6 +47,7 @@ class Growth:
         rest: share of what is missing that the grown model lacks too, where it was not fitted.
         rejected: terms that came and went, with the reason.
         beginnings: what the first term was chosen from, the best first.
+        beyond: share of what is missing to a faster observer that nothing explains; 0 where the fastest that sees it was kept.
     """
 
     track: Track
@@ -56,6 +58,7 @@ class Growth:
     rest: float
     rejected: tuple[tuple[str, str], ...] = field(default=())
     beginnings: tuple[Rival, ...] = field(default=())
+    beyond: float = 0.0
 
     @property
     def price(self) -> float:
@@ -68,7 +71,8 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
     """Grow ``nominal`` until nothing is missing or nothing helps.
 
     What explains most of two effects alone may be neither of them, and what comes after it only mends it: where a grown model
-    leaves something, it is grown again from each of the next best beginnings, and the one that leaves least counts.
+    leaves something, it is grown again from each of the next best beginnings, and the one that leaves least counts. Where a
+    fast observer sees much that nothing explains, a slower one may still see what can be explained.
 
     Args:
         tracks: the same recordings, followed at several bandwidths.
@@ -76,9 +80,21 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
         progress: told what comes.
     """
     tell = progress or (lambda _: None)
+    best = _best_growth(tracks, nominal, tell)
+    slower = [track for track in tracks if track.bandwidth < best.track.bandwidth]
+    if best.rest > _HARDLY and slower and (best.steps or best.end.excess > _SAME * best.end.floor):
+        tell(f"most of it stays unexplained to an observer of {best.track.bandwidth:.3g} rad/s; looking with a slower one")
+        other = _best_growth(slower, nominal, tell)
+        if other.steps and other.rest < _HARDLY:
+            return replace(other, beyond=best.rest)
+    return best
+
+
+def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth:
+    """The best of the models grown from several beginnings."""
     start = best_track(tracks, nominal)
     best = _grown(tracks, start, None, tell)
-    if not best.steps or best.rest > _HARDLY:
+    if not best.steps or (best.rest > _HARDLY and best.begin.excess < _FAINTLY * best.begin.floor):
         faint = _faint(tracks, nominal, tell)
         if faint is not None and faint.steps and (not best.steps or faint.rest < best.rest):
             best = faint

@@ -182,6 +182,15 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
     return state, steps
 
 
+def _is_nothing(held: Term) -> bool:
+    """True for a term whose amplitudes are those of its absence."""
+    neutral = held.effect.neutral
+    names = [p.name for p in held.effect.parameters]
+    return neutral is not None and all(
+        held.values[k] == neutral[k] for k, name in enumerate(names) if name in held.effect.amplitudes
+    )
+
+
 def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step], list[tuple[str, str]]]:
     """Each term taken away again, everything else fitted anew; it goes when hardly anything is lost."""
     gone: list[tuple[str, str]] = []
@@ -194,7 +203,12 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
             continue
         without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
         lost = without.left - state.left
-        if lost < max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
+        held = next(each for each in state.fit.model.terms if each.effect.id == effect_id)
+        if _is_nothing(held):
+            state = without
+            steps = [each for each in steps if each is not step]
+            gone.append((effect_id, "comes out at nothing beside the other terms"))
+        elif lost < max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
             state = without
             steps = [each for each in steps if each is not step]
             gone.append((effect_id, "not needed any more beside the terms that came after it"))
