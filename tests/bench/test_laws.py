@@ -13,11 +13,9 @@ from fric_nodes.bench.compiled_c import FOLDER, compile_loop, compiler
 from fric_nodes.errors import InputError
 from fric_nodes.model import term
 
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler on this machine")
 BY_LAW = {case.law: replace(case, n_steps=3000) for case in laws.CASES}
 
 
-@needs_compiler
 @pytest.mark.parametrize("law", ["STRIBECK", "ACCEL_HYSTERESIS", "LAG", "LUGRE", "GMS"])
 def test_both_come_to_the_same_motion(law: str, tmp_path: Path) -> None:
     case = BY_LAW[law]
@@ -33,7 +31,6 @@ def test_both_come_to_the_same_motion(law: str, tmp_path: Path) -> None:
     assert np.array_equal(first, mine.motion), "a run starts from rest each time"
 
 
-@needs_compiler
 @pytest.mark.parametrize("law", BY_LAW)
 def test_every_c_text_compiles_without_a_warning(law: str) -> None:
     case = BY_LAW[law]
@@ -43,7 +40,6 @@ def test_every_c_text_compiles_without_a_warning(law: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@needs_compiler
 def test_coulomb_and_viscous_friction_in_c_follow_their_closed_form(tmp_path: Path) -> None:
     # u - F_C = 2 on a mass of 1.2 with 10 v: v tends to 0.2 with the time constant 0.12.
     run = compile_loop("algebraic.c", "COULOMB_VISCOUS", tmp_path)
@@ -56,7 +52,6 @@ def test_coulomb_and_viscous_friction_in_c_follow_their_closed_form(tmp_path: Pa
     assert np.all(applied == 6.0)
 
 
-@needs_compiler
 def test_a_ratio_of_different_equations_is_refused(tmp_path: Path) -> None:
     # Hess and Soom's curve under the name of static friction.
     case = replace(BY_LAW["HESS_SOOM"], law="ASYMMETRY")
@@ -65,7 +60,6 @@ def test_a_ratio_of_different_equations_is_refused(tmp_path: Path) -> None:
     assert "motion" in figure.name
 
 
-@needs_compiler
 def test_the_ratio_is_that_of_the_times(tmp_path: Path) -> None:
     mine, other, ratio = laws.measure(BY_LAW["HESS_SOOM"], tmp_path, turns=2)
     assert (mine.unit, other.unit, ratio.unit) == ("ns", "ns", "1")
@@ -83,7 +77,6 @@ def test_without_a_compiler_it_says_so_and_gives_its_own_figures(monkeypatch: py
     assert step.reached is None
 
 
-@needs_compiler
 def test_a_text_that_does_not_compile_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"algebraic\.c: .* failed"):
         compile_loop("algebraic.c", "NO_SUCH_LAW", tmp_path)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
-from fric_nodes.identification.gauss_newton import minimise
+from fric_nodes.identification.gauss_newton import Solution, minimise
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
@@ -64,21 +66,55 @@ def test_the_limit_of_iterations_is_told() -> None:
     assert found.iterations == 2
 
 
-def test_secants_reach_the_same_minimum_with_fewer_evaluations() -> None:
+def decaying(point: Array) -> Array:
+    """A decaying oscillation at 300 times, shape ``(300,)``."""
     time = np.linspace(0.0, 4.0, 300)
-    truth = np.array([2.0, 0.7, 5.0, 0.3])
+    return np.asarray(point[0] * np.exp(-point[1] * time) * np.cos(point[2] * time + point[3]))
+
+
+TRUTH = np.array([2.0, 0.7, 5.0, 0.3])
+START = np.array([1.0, 1.0, 4.6, 0.8])
+ANYWHERE = np.full(4, np.inf)
+TARGET = decaying(TRUTH) + 0.05 * np.random.default_rng(3).standard_normal(300)
+
+
+def test_secants_reach_the_same_minimum_with_fewer_evaluations() -> None:
     count = {False: 0, True: 0}
 
-    def run(secant: bool) -> Array:
+    def run(secant: bool) -> Solution:
         def residual(x: Array) -> Array:
             count[secant] += 1
-            return x[0] * np.exp(-x[1] * time) * np.cos(x[2] * time + x[3]) - target
+            return decaying(x) - TARGET
 
-        target = truth[0] * np.exp(-truth[1] * time) * np.cos(truth[2] * time + truth[3])
-        target = target + 0.05 * np.random.default_rng(3).standard_normal(300)
-        free = np.full(4, np.inf)
-        return minimise(residual, np.array([1.0, 1.0, 4.6, 0.8]), -free, free, secant=secant, cost_tolerance=1e-12).point
+        return minimise(residual, START, -ANYWHERE, ANYWHERE, secant=secant, cost_tolerance=1e-12)
 
-    np.testing.assert_allclose(run(True), run(False), rtol=1e-4)
-    np.testing.assert_allclose(run(True), truth, rtol=0.1)
-    assert count[True] / 2 < count[False]  # it was run twice
+    by_secants, by_differences = run(True), run(False)
+    np.testing.assert_allclose(by_secants.point, by_differences.point, rtol=1e-4)
+    np.testing.assert_allclose(by_secants.point, TRUTH, rtol=0.1)
+    assert count[True] < count[False]
+    # Its Jacobian may be that of a point nearby, not that of another place.
+    apart = np.linalg.norm(by_secants.jacobian - by_differences.jacobian, axis=0)
+    assert np.all(apart < 0.02 * np.linalg.norm(by_differences.jacobian, axis=0))
+
+
+def test_threads_change_nothing_but_who_evaluates() -> None:
+    names = set()
+
+    def residual(x: Array) -> Array:
+        names.add(threading.current_thread().name)
+        return decaying(x) - TARGET
+
+    alone, together = (minimise(residual, START, -ANYWHERE, ANYWHERE, threads=n) for n in (1, 3))
+    assert np.array_equal(alone.point, together.point)
+    assert np.array_equal(alone.jacobian, together.jacobian)
+    assert len(names) > 1
+
+
+def test_what_a_thread_raises_is_raised() -> None:
+    def residual(x: Array) -> Array:
+        if threading.current_thread() is not threading.main_thread():
+            raise ValueError("a column")
+        return x
+
+    with pytest.raises(ValueError, match="a column"):
+        minimise(residual, np.ones(3), -np.ones(3), np.ones(3), threads=2)

@@ -8,7 +8,6 @@ prediction error together with the first, from start values far off.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from ..identification.design.trial import Choice, gains_for, recorded, simulated
 from ..identification.result import Options
 from ..model import Model, build_model, term
 from ..record import Array, Record
+from ..threads import alone
 from .benchmark import Benchmark, Figure
 
 __all__ = ["BENCHMARK", "CASES", "Case", "first_recording", "fitted", "proposal", "retold"]
@@ -115,10 +115,8 @@ def _spread(name: str, found: Proposal, parts: Parts, pool: ProcessPoolExecutor)
 
 def run() -> list[Figure]:
     """Predicted and achieved worst errors of every case."""
-    # Each process has one thread of linear algebra: more would only get in each other's way.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     figures = []
-    with ProcessPoolExecutor(_PROCESSES, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(_PROCESSES, get_context("spawn"), initializer=alone) as pool:
         for name, case in CASES.items():
             found = proposal(case)
             if found.generic is None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import multiprocessing
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 
@@ -19,6 +18,7 @@ from scipy.special import ndtri
 from ..identification.calibration import Calibration
 from ..identification.result import Identification, IdentificationError
 from ..record import Array
+from ..threads import alone
 from .benchmark import Figure
 
 __all__ = ["SEEDS", "Finding", "count", "figures_of", "of_model", "over_interval"]
@@ -72,8 +72,7 @@ def count(trial: Callable[[int], Finding], seeds: Sequence[int], n_processes: in
     if n_processes == 1:
         rows = [guarded(seed) for seed in seeds]
     else:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        with ProcessPoolExecutor(n_processes, multiprocessing.get_context("spawn")) as pool:
+        with ProcessPoolExecutor(n_processes, multiprocessing.get_context("spawn"), initializer=alone) as pool:
             rows = list(pool.map(guarded, seeds, chunksize=4))
     kept = [row for row in rows if row is not None]
     if not kept:

@@ -25,6 +25,7 @@ from ..instrument import Finding as Check
 from ..instrument import inspect
 from ..model import Model
 from ..record import Array, Record
+from ..threads import linear_algebra_in_one
 from .candidates import Scales, candidates, place_of, scales_of
 from .component import Signature, signatures
 from .confidence import confidence_of, unknown_confidence
@@ -35,7 +36,7 @@ from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
 from .rivals import FAR_OFF, implausible
 from .screen import Tried
-from .settle import Step
+from .settle import FLOOR_KNOWN, Step
 from .track import Fit, Track
 from .twin import twins
 
@@ -45,7 +46,6 @@ _BANDWIDTHS = (45.0, 140.0, 400.0)  # [rad/s]
 _FAST = 1.0  # largest product of bandwidth and sample time
 _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
-_FLOOR_KNOWN = 0.1  # of itself, how well a floor is known
 _KEPT = 0.4  # of what a grown model took off where it was fitted, to be found on the recordings held back
 _UNEXPLAINED = 0.15  # of what was missing: with more left, something unknown remains
 _FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is missing is known the worse
@@ -61,6 +61,7 @@ class DiagnosisError(InputError):
     """Recordings or a model that can't be compared."""
 
 
+@linear_algebra_in_one()
 def diagnose(
     train: Sequence[Record], validation: Sequence[Record], nominal: Model, progress: Callable[[str], None] | None = None
 ) -> Diagnosis:
@@ -200,12 +201,13 @@ def _concluded(
     # What the recordings held back don't show has been chance, or has been over before they were made.
     missing = missing and (noe["refit"] > (1.0 + _CONFIRMED) * noise_floor or _paired(growth, noe, noise_floor))
     if not missing or noe["augmented"] > noe["refit"]:
-        growth = replace(growth, end=growth.begin, steps=(), rejected=(*growth.rejected, *_withdrawn(growth, missing)))
+        gone = (*growth.rejected, *_withdrawn(growth, missing))
+        growth = replace(growth, end=growth.begin, steps=(), rejected=gone, beyond=0.0)
         end, left["augmented"] = begin, left["refit"]
         scored = replace(scored, noe_augmented=noe["refit"])
     scales = scales_of(held)
     # Floors of few twins are known to a tenth or two of themselves, no better.
-    sure = noise_floor * _FLOOR_KNOWN + 200.0 * float(np.std([each @ each for each in floor])) / spread
+    sure = noise_floor * FLOOR_KNOWN + 200.0 * float(np.std([each @ each for each in floor])) / spread
     seen_rest = max(scored.noe_augmented - noise_floor - sure, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
     seen_rest *= held.unpaid(begin) if end.has_slip_dynamics else 1.0
     rest = min(max(growth.rest, seen_rest), 1.0) if missing else 0.0
@@ -220,14 +222,15 @@ def _concluded(
     most = _UNEXPLAINED if len(findings) < _MANY else _SIGNED
     unsure = _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300)
     unknown = missing and (rest > min(most + unsure, _HARDLY) or not findings or stand_in or far_off or growth.beyond > 0.0)
-    unexplained = Unexplained(max(rest, growth.beyond if missing else 0.0), None)
+    unexplained = Unexplained(max(rest, growth.beyond), None)
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
         where = _where_left(held, left["augmented"], floor, scales, end)
-        unexplained = Unexplained(max(rest, growth.beyond), where)
+        unexplained = replace(unexplained, where=where)
         if likely is not None and unknown:
-            # What helps is told all the same, as sure as such findings were right when so much was left.
-            found = sorted(findings, key=lambda each: -each.confidence)
-            findings = [_unknown(where, likely, growth, scored, unexplained.share), *found]
+            nobody = _unknown(where, likely, growth, scored, unexplained.share)
+            # What helps is told all the same; beside something unknown one in ten of such findings was right.
+            found = [replace(each, confidence=min(each.confidence, round(1.0 - nobody.confidence, 4))) for each in findings]
+            findings = [nobody, *sorted(found, key=lambda each: -each.share)]
     return Diagnosis(
         mismatch=missing,
         checks=tuple(checks),
@@ -241,7 +244,7 @@ def _concluded(
         refit=begin,
         given=nominal,
         prediction=tuple(_predictions(validation, held, left)),
-        notes=(*corrected, *_beyond(growth)),
+        notes=(*corrected, *_reservations(growth, nominal, far_off and bool(growth.steps))),
         bandwidth=held.bandwidth,
         growth=growth,
     )
@@ -256,14 +259,21 @@ def _paired(growth: Growth, noe: dict[str, float], noise_floor: float) -> bool:
     return bool(growth.steps) and noe["refit"] - noe["augmented"] > _KEPT * promised * noise_floor
 
 
-def _beyond(growth: Growth) -> list[str]:
-    """What is to be said where the effects named are those of a slow observer."""
-    if growth.beyond == 0.0:
-        return []
-    return [
-        f"the effects named explain what is missing up to about {growth.track.bandwidth:.3g} rad/s; of what a faster observer "
-        f"sees {100.0 * growth.beyond:.3g} % stays unexplained"
-    ]
+def _reservations(growth: Growth, nominal: Model, far_off: bool) -> list[str]:
+    """Why the effects named are no full explanation, where the share that is left doesn't say it."""
+    notes = []
+    if growth.beyond > 0.0:
+        notes.append(
+            f"the effects named explain what is missing up to about {growth.track.bandwidth:.3g} rad/s; of what a faster "
+            f"observer sees {100.0 * growth.beyond:.3g} % stays unexplained"
+        )
+    if far_off:
+        fitted = growth.end.fit.model.total_inertia
+        notes.append(
+            f"with the effects named the mass comes out at {fitted:.3g}, given was {nominal.total_inertia:.3g}: they are no "
+            "explanation, unless the given one is off by more than two"
+        )
+    return notes
 
 
 def _withdrawn(growth: Growth, missing: bool) -> list[tuple[str, str]]:

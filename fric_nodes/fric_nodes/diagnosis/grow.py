@@ -119,8 +119,8 @@ def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], 
 
 
 def _done(growth: Growth) -> bool:
-    """True when little is left by few terms: many have often come to mend a wrong first one."""
-    return growth.rest < _AGAIN and len(growth.steps) < _MANY
+    """True when little is left by few terms, or hardly anything: many have often come to mend a wrong first one."""
+    return growth.rest < (_AGAIN if len(growth.steps) < _MANY else _LITTLE)
 
 
 def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth | None:
@@ -132,13 +132,13 @@ def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None])
     best: tuple[float, Track, State, Screening] | None = None
     for track in tracks:
         state = refit(track, nominal)
-        found = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance)
+        found = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False)
         clear = tuple(each for each in found.tried if each.gain > _chance_of(track, state, (each,)))
         if not clear:
             continue
         surprise = clear[0].gain / state.floor * track.independent
         if best is None or surprise > best[0]:
-            best = surprise, track, state, replace(found, tried=clear, laws=(), pairs=(), foremost=())
+            best = surprise, track, state, replace(found, tried=clear, laws=(), foremost=())
     if best is None:
         return None
     _, track, state, found = best
@@ -146,9 +146,8 @@ def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None])
     rivals = [rival for rival in rivals if state.left - rival.left > _chance_of(track, state, rival.offer)]
     if not rivals:
         return None
-    gain = [max(state.left - rival.left, 0.0) for rival in rivals]
-    others = [each for each, rival in zip(gain, rivals, strict=True) if rival.effect.id != rivals[0].effect.id]
-    if max(others, default=0.0) > _ALIKE * gain[0]:
+    others = [state.left - rival.left for rival in rivals if rival.effect.id != rivals[0].effect.id]
+    if max(others, default=0.0) > _ALIKE * (state.left - rivals[0].left):
         return None
     return _grown([track], (track, state), rivals[0], tell)
 
@@ -172,13 +171,39 @@ def _grown(
     tell: Callable[[str], None],
     exchange: bool = True,
 ) -> Growth:
-    """The model grown from ``start``, with ``first`` as its first step where it is given."""
+    """The model grown from ``start``, with ``first`` as its first step where it is given.
+
+    Where terms have gone that only mended what others lacked, there is room again for what is still missing, if it is much.
+    """
     track, begin = start
+    raw = _added(tracks, Growth(track, begin, begin, (), (), 1.0), first, tell)
+    growth = _settled(raw, exchange)
+    if 0 < len(growth.steps) < len(raw.steps) and growth.end.excess > _LITTLE * growth.begin.excess:
+        raw = _added(tracks, growth, None, tell)
+        if len(raw.steps) > len(growth.steps):
+            more = _settled(raw, exchange)
+            # What comes to the same terms has earned its place among them; other terms have to be better altogether.
+            if {step.term for step in growth.steps} <= {step.term for step in more.steps}:
+                better = more.rest < growth.rest
+            else:
+                better = bool(more.steps) and more.price < growth.price
+            growth = more if better else growth
+    return growth
+
+
+def _settled(growth: Growth, exchange: bool) -> Growth:
+    """``growth`` after each of its terms had to earn its place again."""
+    done = settled(growth.track, growth.begin, growth.end, list(growth.steps))
+    gone = (*growth.rejected, *done.gone)
+    held = replace(growth, begin=done.begin, end=done.state, steps=done.steps, rest=done.rest, rejected=gone)
+    return _exchanged(held) if exchange else held
+
+
+def _added(tracks: Sequence[Track], growth: Growth, first: Rival | None, tell: Callable[[str], None]) -> Growth:
+    """``growth`` and the terms that come to it while they help; what it leaves on unseen halves is not known yet."""
+    track, begin, state = growth.track, growth.begin, growth.end
     scales = scales_of(track)
-    state = begin
-    steps: list[Step] = []
-    last: tuple[Tried, ...] = ()
-    beginnings: tuple[Rival, ...] = ()
+    steps, last, beginnings = list(growth.steps), growth.last, growth.beginnings
     while True:
         if first is not None:
             rivals, last, first = [first], first.screened, None
@@ -191,7 +216,7 @@ def _grown(
             if not rivals:
                 break
         best = rivals[0]
-        beginnings = beginnings or tuple(rivals[1:])
+        beginnings = beginnings if steps else tuple(rivals[1:])
         tell(
             f"{' and '.join(best.names)}: {100 * (state.left - best.left) / max(state.excess, 1e-300):.0f} % of what is missing"
         )
@@ -204,11 +229,7 @@ def _grown(
         track, state = best_track(tracks, best.fit.model, max_iterations=6)
         state, steps = merged(track, begin, state, steps)
         scales = scales_of(track)
-        begin_here = refit(track, begin.fit.model, max_iterations=4)
-        if state.excess < _LITTLE * begin_here.excess:
-            found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
-            last = found.tried
+        if state.excess < _LITTLE * refit(track, begin.fit.model, max_iterations=4).excess:
+            last = screen(track, state.fit, candidates(state.fit.model, scales), state.chance, in_pairs=False).tried
             break
-    done = settled(track, begin, state, steps)
-    growth = Growth(track, done.begin, done.state, done.steps, last, done.rest, done.gone, beginnings)
-    return _exchanged(growth) if exchange else growth
+    return replace(growth, track=track, end=state, steps=tuple(steps), last=last, beginnings=beginnings)

@@ -16,6 +16,7 @@ from .track import Fit, Track
 
 __all__ = [
     "BY_CHANCE",
+    "FAR_OFF",
     "OF_FLOOR",
     "PER_PARAMETER",
     "Rival",

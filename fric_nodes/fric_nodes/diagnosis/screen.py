@@ -14,12 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..model import Term
-from ..record import Array
+from ..record import Array, Index
+from ..threads import n_threads
 from .along import Along
 from .candidates import Candidate
 from .track import Fit, Track
@@ -32,6 +33,7 @@ _TINY = 1e-10
 _VISIBLE = 1e-12  # of what is missing, the least that a trial changes
 _OWN = 0.02  # of a column, what the fit's own parameters must not be able to do
 _PAIRS = 5
+_AT_ONCE = 400  # sets of columns whose equations are solved together
 _FOREMOST = 2  # effects that are kept for what they promise along the motion
 
 
@@ -89,18 +91,28 @@ class Gram:
 
     def left(self, target: int, used: Sequence[int]) -> float:
         """Sum of squares of the column ``target`` that the columns ``used``, fitted without each block, leave in it."""
-        index = np.array(used, dtype=np.int64)
-        if index.size == 0:
-            return float(self.total[target, target])
-        scale = np.sqrt(np.maximum(np.diag(self.total)[index], 1e-300))
-        inside = self.total[np.ix_(index, index)] - self.of_block[:, index[:, None], index[None, :]]
-        load = self.total[index, target] - self.of_block[:, index, target]
-        normal = inside / np.outer(scale, scale) + np.diag(_TINY + self._held[index] / scale**2)
-        weight = -np.linalg.solve(normal, (load / scale)[..., None])[..., 0] / scale
-        held = self.of_block
-        linear = np.einsum("bi,bi->b", weight, held[:, index, target])
-        square = np.einsum("bi,bij,bj->b", weight, held[:, index[:, None], index[None, :]], weight)
-        return float(np.sum(held[:, target, target] + 2.0 * linear + square))
+        return float(self.lefts(target, np.array([used], dtype=np.int64))[0])
+
+    def lefts(self, target: int, used: Index) -> Array:
+        """:meth:`left` of many sets of columns of one size, ``used`` of shape ``(n_sets, n_used)``; shape ``(n_sets,)``."""
+        held = self.of_block[:, target, target]
+        if used.shape[1] == 0:
+            return np.full(used.shape[0], self.total[target, target])
+        found = np.empty(used.shape[0])
+        for first in range(0, used.shape[0], _AT_ONCE):
+            index = used[first : first + _AT_ONCE]
+            scale = np.sqrt(np.maximum(np.diag(self.total)[index], 1e-300))
+            # Sets, blocks, rows, columns.
+            within = np.moveaxis(self.of_block[:, index[:, :, None], index[:, None, :]], 0, 1)
+            with_target = np.moveaxis(self.of_block[:, index, target], 0, 1)
+            normal = self.total[index[:, :, None], index[:, None, :]][:, None] - within
+            normal /= (scale[:, :, None] * scale[:, None, :])[:, None]
+            normal += ((_TINY + self._held[index] / scale**2)[:, :, None] * np.eye(index.shape[1]))[:, None]
+            load = (self.total[index, target][:, None] - with_target) / scale[:, None]
+            weight = -np.linalg.solve(normal, load[..., None])[..., 0] / scale[:, None]
+            own = np.sum(weight * (2.0 * with_target + (within @ weight[..., None])[..., 0]), axis=(1, 2))
+            found[first : first + _AT_ONCE] = np.sum(held) + own
+        return found
 
     def solved(self, target: int, used: Sequence[int]) -> Array:
         """Coefficients of the columns ``used`` that leave the least of ``target`` over all blocks."""
@@ -193,7 +205,7 @@ def _scales(name: str, trial: Term) -> bool:
 def columns_of(track: Track, fit: Fit, trials: Sequence[Term]) -> list[Column]:
     """The observer's columns of ``trials``, on all cores."""
     jobs = [(trial, part) for trial in trials for part in _parts(trial)]
-    with ThreadPoolExecutor(2) as pool:
+    with ThreadPoolExecutor(n_threads()) as pool:
         residuals = list(pool.map(lambda job: track.residual(fit.model.with_terms((*fit.model.terms, job[1]))), jobs))
     found: dict[int, list[Array]] = {}
     for (trial, part), residual in zip(jobs, residuals, strict=True):
@@ -237,10 +249,13 @@ class Screening:
     foremost: tuple[Tried, ...] = ()
 
 
-def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: Sequence[Array]) -> Screening:
-    """Every candidate at first order, alone and in pairs, on blocks that it has not seen."""
+def screen(
+    track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: Sequence[Array], in_pairs: bool = True
+) -> Screening:
+    """Every candidate at first order, alone and, where that is wanted, in pairs, on blocks that it has not seen."""
     quick = Promise(Along(track), fit)
-    trials = [trial for candidate in found for trial in quick.narrowed(candidate)]
+    with ThreadPoolExecutor(n_threads()) as pool:
+        trials = [trial for kept in pool.map(quick.narrowed, found) for trial in kept]
     columns = columns_of(track, fit, trials)
     n_free = len(fit.names)
     stacked = [fit.residual[:, None], *(each[:, None] for each in twin_residuals), fit.jacobian]
@@ -287,35 +302,42 @@ def screen(track: Track, fit: Fit, found: Sequence[Candidate], twin_residuals: S
             laws.setdefault(name, tried)
     ranked, others = (tuple(sorted(each.values(), key=lambda one: one.left)) for each in (best, laws))
     foremost = sorted(ranked, key=lambda each: -quick.share.get(each.column.term.effect.key, 0.0))[:_FOREMOST]
-    return Screening(alone, ranked, others, _pairs(gram, refit, able, unpaid), unpaid, tuple(foremost))
+    return Screening(alone, ranked, others, _pairs(gram, refit, able, unpaid) if in_pairs else (), unpaid, tuple(foremost))
 
 
 def _pairs(
     gram: Gram, refit: list[int], able: Sequence[tuple[Tried, list[int]]], unpaid: float
 ) -> tuple[tuple[Tried, Tried, float], ...]:
     """The best pairs of trials of different effects, one pair for each two effects."""
-    best: dict[tuple[str, str], tuple[Tried, Tried, float]] = {}
-    n_free = len(refit)
+    couples: dict[int, list[tuple[Tried, Tried]]] = {}  # by the number of their columns
+    used: dict[int, list[list[int]]] = {}
     for k, (one, place) in enumerate(able):
         for other, beside in able[k + 1 :]:
-            names = (one.column.term.effect.id, other.column.term.effect.id)
-            if names[0] == names[1] or _exclude(one, other):
-                continue
-            slips = one.column.term.effect.slip is not None or other.column.term.effect.slip is not None
-            left = gram.left(0, refit + place + beside) * (unpaid if slips else 1.0)
-            if names not in best or left < best[names][2]:
-                solved = gram.solved(0, refit + place + beside)
-                first = Tried(
-                    one.column, one.left, one.gain, one.by_chance, solved[n_free : n_free + len(place)], solved[:n_free]
-                )
-                rest = solved[n_free + len(place) :]
-                second = Tried(other.column, other.left, other.gain, other.by_chance, rest, solved[:n_free])
-                if (not one.column.amplitudes and first.coefficients[0] <= 0.0) or (
-                    not other.column.amplitudes and rest[0] <= 0.0
-                ):
-                    continue
-                best[names] = (first, second, left)
-    return tuple(sorted(best.values(), key=lambda each: each[2])[:_PAIRS])
+            if one.column.term.effect.id != other.column.term.effect.id and not _exclude(one, other):
+                couples.setdefault(len(place) + len(beside), []).append((one, other))
+                used.setdefault(len(place) + len(beside), []).append(refit + place + beside)
+    all_of_them: list[tuple[float, Tried, Tried, list[int]]] = []
+    for size, held in couples.items():
+        left = gram.lefts(0, np.array(used[size], dtype=np.int64))
+        slips = [any(each.column.term.effect.slip is not None for each in couple) for couple in held]
+        left = left * np.where(slips, unpaid, 1.0)
+        all_of_them += [(float(each), *couple, index) for each, couple, index in zip(left, held, used[size], strict=True)]
+    best: dict[tuple[str, str], tuple[Tried, Tried, float]] = {}
+    n_free = len(refit)
+    for left_there, one, other, index in sorted(all_of_them, key=lambda each: each[0]):
+        names = (one.column.term.effect.id, other.column.term.effect.id)
+        if names in best:
+            continue
+        solved = gram.solved(0, index)
+        cut = n_free + len(one.column.parts)
+        first = replace(one, coefficients=solved[n_free:cut], moved=solved[:n_free])
+        second = replace(other, coefficients=solved[cut:], moved=solved[:n_free])
+        # A whole term that would have to be subtracted is the opposite of an effect, which there isn't.
+        if all(each.column.amplitudes or each.coefficients[0] > 0.0 for each in (first, second)):
+            best[names] = (first, second, left_there)
+            if len(best) == _PAIRS:
+                break
+    return tuple(best.values())
 
 
 def _exclude(one: Tried, other: Tried) -> bool:

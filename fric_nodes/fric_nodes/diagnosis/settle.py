@@ -15,11 +15,11 @@ from .track import Track, Twin
 from .twin import twins
 from .universe import worth_trying
 
-__all__ = ["Settled", "Step", "audit", "exchanged", "merged", "settled"]
+__all__ = ["FLOOR_KNOWN", "Settled", "Step", "audit", "exchanged", "merged", "settled"]
 
 _TO_STAY = 0.004  # of what is missing at the start, beside all other terms
 _AUDITED = 0.04  # of what is missing: with more left, it is looked at whether halves of the recordings tell the parameters
-_FLOOR_KNOWN = 0.1  # of itself, how well a floor is known
+FLOOR_KNOWN = 0.1  # of itself, how well a floor is known
 _TWINS = 2
 _HOPELESS = 0.5  # of what is missing: with more left, no exchange of a term makes an explanation
 
@@ -133,7 +133,7 @@ def audit(track: Track, begin: Model, end: Model) -> float:
     if left - floor > _AUDITED * missing:
         of_twins = float(np.mean([_on_other_half(track, end, twin) for twin in made]))
         left -= max(of_twins - floor, 0.0)
-    return unpaid * max(left - (1.0 + _FLOOR_KNOWN) * floor, 0.0) / missing
+    return unpaid * max(left - (1.0 + FLOOR_KNOWN) * floor, 0.0) / missing
 
 
 def _on_other_half(track: Track, model: Model, twin: Twin | None = None) -> float:
@@ -166,10 +166,8 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         if len(terms) != len(state.fit.model.terms) - 1:
             continue
         without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
-        found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance)
-        rivals = [
-            rival for rival in rivals_of(track, without, replace(found, pairs=()), scales) if rival.effect.id != effect_id
-        ]
+        found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance, in_pairs=False)
+        rivals = [rival for rival in rivals_of(track, without, found, scales) if rival.effect.id != effect_id]
         own = state.left + _price(track, state.fit.model, step.term, without.excess)
         if rivals and own - rivals[0].score > max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
             state = refit(track, rivals[0].fit.model, max_iterations=6)
@@ -203,13 +201,10 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
             continue
         without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
         lost = without.left - state.left
-        held = next(each for each in state.fit.model.terms if each.effect.id == effect_id)
-        if _is_nothing(held):
+        nothing = _is_nothing(next(each for each in state.fit.model.terms if each.effect.id == effect_id))
+        if nothing or lost < max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
             state = without
             steps = [each for each in steps if each is not step]
-            gone.append((effect_id, "comes out at nothing beside the other terms"))
-        elif lost < max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
-            state = without
-            steps = [each for each in steps if each is not step]
-            gone.append((effect_id, "not needed any more beside the terms that came after it"))
+            why = "comes out at nothing" if nothing else "not needed any more"
+            gone.append((effect_id, f"{why} beside the other terms"))
     return state, steps, gone

@@ -16,6 +16,7 @@ import numpy as np
 from ..identification.gauss_newton import Solution
 from ..model import Model, Term
 from ..record import Array, Record
+from ..threads import n_threads
 from .along import Along
 from .candidates import candidates, place_of, scales_of
 from .fitting import bounds_of, free_names
@@ -138,7 +139,7 @@ def _present(track: Track, model: Model, missing: Array) -> list[_Suspect]:
         values[at] += step if values[at] + step <= parameter.declaration.upper else -step
         steps.append(float(values[at] - model.values[at]))
         trials.append(model.with_values(values))
-    with ThreadPoolExecutor(2) as pool:
+    with ThreadPoolExecutor(n_threads()) as pool:
         residuals = list(pool.map(track.residual, trials))
     columns = {name: (residual - missing) / step for name, residual, step in zip(names, residuals, steps, strict=True)}
     return [

@@ -37,6 +37,7 @@ from ..identification.innovations import Run, noise_of, runs_of
 from ..model import Model, Term
 from ..record import Array, Index, Mask, Record
 from ..simulate import respond, substeps
+from ..threads import n_threads
 from .universe import universe_of
 
 __all__ = ["Bounds", "Fit", "Motion", "Track", "Twin", "fitted_values", "resolution", "smooth"]
@@ -44,6 +45,7 @@ __all__ = ["Bounds", "Fit", "Motion", "Track", "Twin", "fitted_values", "resolut
 _SMOOTH = 4.0  # times the bandwidth: of the motion along which a force is needed
 _STEP_OF_RATE = 0.2
 _MOST_STEPS = 4  # per sample: the step is implicit, and what is faster than the observer changes nothing that it sees
+_STEP_OF_OBSERVER = 0.4  # of the observer's time constant: shorter ones it can't tell from this
 _SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
 _MOST_GAIN = 2.5  # times gain and 2 alpha + beta; at 4 the pursuit of a mass begins to swing
 _LIGHTEST = 4.0  # times lighter than the mass whose impulses lead it, a model at most
@@ -269,10 +271,11 @@ class Track:
     def n_substeps(self, model: Model, run: Run) -> int:
         """Steps of ``model`` per sample, enough for what the observer sees.
 
-        Bristles and contacts may be far faster than that; with four steps per sample the missing force differs from that with
-        as many as their rate asks for by less than 1/300 of what is missing.
+        Bristles and contacts may be far faster than that; with so many steps the missing force differs from that with as many
+        as their rate asks for by less than 1/300 of what is missing.
         """
-        return min(substeps(model, run.sample_time, _STEP_OF_RATE), _MOST_STEPS)
+        most = min(math.ceil(self.bandwidth * run.sample_time / _STEP_OF_OBSERVER), _MOST_STEPS)
+        return min(substeps(model, run.sample_time, _STEP_OF_RATE), most)
 
     def seen(self, of_run: Sequence[Array]) -> Array:
         """A force per interval as the observer would see it, were it missing: filtered, joined, shape ``(n,)``."""
@@ -324,6 +327,7 @@ class Track:
             cost_tolerance=1e-5,
             max_iterations=max_iterations,
             secant=True,
+            threads=n_threads(),
         )
         return Fit(found, tuple(names), answer, scale)
 

@@ -22,6 +22,7 @@ from .universe import universe_of
 __all__ = ["twins"]
 
 _SMOOTH = 4.0  # times the observer's bandwidth: of the motion that a twin is led along
+_ESCAPED = 10.0  # spans of the recorded motion, beyond which it does not matter how far a twin has run
 _LED = 4.0  # times the observer's bandwidth: of the spring that leads it; with a softer one a model sticks and slips
 
 
@@ -59,6 +60,10 @@ def _noisy(runs: Sequence[Run], led: Sequence[tuple[Array, Array, Array]], rando
         step = resolution(run.position)
         # What the steps of the encoder don't explain of the noise is the sensor's own.
         own = math.sqrt(max(noise_of(run.position) ** 2 - step**2 / 12.0, 0.0))
-        moved = there + own * random.standard_normal(there.shape[0])
+        # A model that escapes, however it is led, has a twin that runs away: far enough to be told, not beyond all numbers.
+        low, high = float(np.min(run.position)), float(np.max(run.position))
+        reach = _ESCAPED * (high - low)
+        moved = np.clip(np.nan_to_num(there, nan=high + reach), low - reach, high + reach)
+        moved = moved + own * random.standard_normal(there.shape[0])
         positions.append(np.round(moved / step) * step if step > 0.0 else moved)
     return Twin(tuple(efforts), tuple(positions), tuple(extra for _, extra, _ in led))

@@ -19,6 +19,7 @@ __all__ = [
     "SEEN_RATE",
     "Inner",
     "Surroundings",
+    "bends",
     "command",
     "drive",
     "force",
@@ -29,6 +30,7 @@ __all__ = [
     "play",
     "prepare",
     "remember",
+    "remembers",
     "slip",
     "step",
     "unpacked",
@@ -75,6 +77,16 @@ class Surroundings(NamedTuple):
     time: float
     load: float
     temperature: float
+
+
+def bends(p: Any) -> bool:
+    """True when a term that is there depends on the sign of the acceleration."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def remembers(p: Any) -> bool:
+    """True when a term of the contact that is there has memory."""
+    raise AssertionError("a stand-in, see the module")
 
 
 def level(c: Context, p: Any) -> float:

@@ -133,6 +133,8 @@ class _Assembly:
         self.level: list[str] = []
         self.force: list[str] = []
         self.remember: list[str] = []
+        self.bends: list[str] = []  # conditions, any of which makes it true; the next alike
+        self.remembers: list[str] = []
         self.slip = "    return 0.0"
         self.command: list[str] = []
         self.play: list[str] = []
@@ -153,7 +155,12 @@ class _Assembly:
             return f"{role}_{number}({', '.join((*first, *parameters))})"
 
         optional = self._switches is not None and effect.neutral is not None
-        switch = f"if p[{self._switches + number}] != 0.0: " if self._switches is not None and optional else ""
+        there = f"p[{self._switches + number}] != 0.0" if self._switches is not None and optional else "True"
+        switch = "" if there == "True" else f"if {there}: "
+        if effect.uses_acceleration:
+            self.bends.append(there)
+        if effect.remember is not None:
+            self.remembers.append(there)
         kept = (str(self._memory),) if effect.n_memory else ()
         if effect.remember is not None:
             self.remember.append(f"    {switch}{call('remember', 'c', 'total' if effect.level else '0.0', *kept)}")
@@ -206,6 +213,10 @@ def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
         f"SEEN, SEEN_RATE = {plant.encoder}",
         "@kernel\ndef unpacked(p):",
         f"    return ({''.join(f'p[{k}], ' for k in range(n_parameters))})",
+        "@kernel\ndef bends(p):",
+        f"    return {' or '.join(parts.bends) or False}",
+        "@kernel\ndef remembers(p):",
+        f"    return {' or '.join(parts.remembers) or False}",
         *_summing("level_sum(c, p)", parts.level),
         "@kernel\ndef level(c, p):",
         "    return max(level_sum(c, p), 0.0)",

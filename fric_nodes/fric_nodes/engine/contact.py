@@ -32,7 +32,7 @@ import math
 from typing import Any
 
 from ..effect import Context
-from .assembled import ACCELERATION, RIGID, Inner, Surroundings, force, level, own, slip
+from .assembled import ACCELERATION, RIGID, Inner, Surroundings, bends, force, level, own, slip
 from .kernel import kernel
 
 __all__ = ["CONTACT_FUNCTIONS", "contact_step", "glide", "opposing", "slide", "solve"]
@@ -62,7 +62,7 @@ def solve(
     n = s.z.shape[0]
     half = h * (0.5 / m)
     bend = 0.0
-    if ACCELERATION:
+    if ACCELERATION and bends(p):
         force_up, friction_up = opposing(p, s, q, v, h, side, 1.0, around)
         force_down, friction_down = opposing(p, s, q, v, h, side, -1.0, around)
         if u - force_up - friction_up > 0.0:

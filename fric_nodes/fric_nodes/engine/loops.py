@@ -23,6 +23,7 @@ from .assembled import (
     level_sum,
     prepare,
     remember,
+    remembers,
     slip,
     step,
     unpacked,
@@ -42,7 +43,7 @@ def advance(p: Any, x: Any, x_next: Any, s: Inner, u: float, h: float, around: S
     if not RIGID:
         for j in range(s.z.shape[0]):
             s.z[j] = s.z_next[j]
-    if MEMORY:
+    if MEMORY and remembers(p):
         w = (x[0] - q) / h
         change = x[1] - v
         bend = 1.0 if change > 0.0 else (-1.0 if change < 0.0 else 0.0)
@@ -115,7 +116,7 @@ def predict(
                 z[j] = z_next[j]
         friction_out[k] = friction
         u_out[k] = drive(p, q[k], v[k], a[k]) + force(c, p) + friction
-        if MEMORY:
+        if MEMORY and remembers(p):
             remember(c, p)
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import multiprocessing
-import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from scipy.special import ndtri
 from ..model import Model, build_model, term
 from ..record import Array, Record
 from ..simulate import Simulator, substeps
+from ..threads import alone
 from .result import Options
 
 __all__ = ["AXES", "Calibration", "TestAxis", "calibrate", "recording"]
@@ -204,9 +204,7 @@ def calibrate(
     if n_processes == 1:
         rows = [work(seed) for seed in seeds]
     else:
-        # Each process has one thread of linear algebra: more would only get in each other's way.
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        with ProcessPoolExecutor(n_processes, multiprocessing.get_context("spawn")) as pool:
+        with ProcessPoolExecutor(n_processes, multiprocessing.get_context("spawn"), initializer=alone) as pool:
             rows = list(pool.map(work, seeds, chunksize=4))
     names = _free(axis)
     truth = np.array([axis.truth.value(name) for name in names])

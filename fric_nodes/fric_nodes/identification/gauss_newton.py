@@ -7,13 +7,15 @@ Gauss-Newton steps with Levenberg-Marquardt damping on the normal equations, col
 bounds by an active set: a component that would leave is put on its bound and the rest solved again. The damping follows the
 ratio of actual to predicted decrease (Nielsen 1999). A step needs only sums over the residuals, so that an iteration costs its
 n_parameters + 1 evaluations and little else; decomposing the whole Jacobian costs more than the simulations that it comes from.
-Where evaluations are dear, every other Jacobian may be Broyden's secant update of the one before, which costs none.
+Where evaluations are dear, every other Jacobian may be Broyden's secant update of the one before, which costs none, and the
+columns of the others may come from several threads.
 Source: Madsen, Nielsen, Tingleff 2004, sections 3.2 and 3.4; the active set is that of Bertsekas 1982 for simple bounds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +37,7 @@ class Solution:
     Attributes:
         point: shape ``(n_parameters,)``.
         residual: there, shape ``(n,)``.
-        jacobian: there, shape ``(n, n_parameters)``.
+        jacobian: there, shape ``(n, n_parameters)``; with ``secant`` it may be the update of one a step or two before.
         converged: False when the limit of iterations was reached before.
         iterations: number of Jacobians.
     """
@@ -59,6 +61,7 @@ def minimise(
     max_iterations: int = 60,
     most_slow: int = 0,
     secant: bool = False,
+    threads: int = 1,
 ) -> Solution:
     """The point within bounds at which the sum of squares of ``function`` is smallest, near ``start``.
 
@@ -73,6 +76,7 @@ def minimise(
         most_slow: number of steps in a row that decrease the cost by less than that, at which to stop; 0: no such limit.
         max_iterations: limit.
         secant: True to take differences at every other point only, where the step to it went as foreseen.
+        threads: that evaluate ``function`` for differences; more than one helps where it leaves the interpreter to others.
     """
     point = np.clip(start, lower, upper)
     residual = function(point)
@@ -84,7 +88,7 @@ def minimise(
     for iteration in range(1, max_iterations + 1):
         exact = not (secant and exact and foreseen)
         if exact:
-            _differences(function, point, residual, upper, difference, jacobian)
+            _differences(function, point, residual, upper, difference, jacobian, threads)
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
         for _ in range(30):
             step = _proposal(normal, gradient, damping, point, lower, upper)
@@ -92,8 +96,6 @@ def minimise(
             promised = -float(step @ (2.0 * gradient + normal @ step))
             small = np.all(np.abs(step) <= point_tolerance * (np.abs(point) + point_tolerance))
             if small or 0 < most_slow <= slow or 0.0 <= promised <= cost_tolerance * cost:
-                if not exact:
-                    _differences(function, point, residual, upper, difference, jacobian)
                 return Solution(point, residual, jacobian, True, iteration)
             if promised < 0.0:
                 # A bound has bent the step uphill; a shorter one goes along the gradient.
@@ -106,7 +108,7 @@ def minimise(
             if gain > 0.0:
                 slow = slow + 1 if cost - trial_cost <= cost_tolerance * cost else 0
                 foreseen = abs(gain - 1.0) < _FORESEEN
-                if secant and exact and foreseen:
+                if secant and foreseen:
                     moved = trial - point
                     jacobian += np.outer(trial_residual - residual - jacobian @ moved, moved / (moved @ moved))
                 point, residual, cost = trial, trial_residual, trial_cost
@@ -116,26 +118,42 @@ def minimise(
             damping *= growth
             growth *= 2.0
             if not exact:
-                _differences(function, point, residual, upper, difference, jacobian)
+                _differences(function, point, residual, upper, difference, jacobian, threads)
                 normal, gradient, exact = jacobian.T @ jacobian, jacobian.T @ residual, True
         else:
             # No direction goes down: the differences have said all they can.
             return Solution(point, residual, jacobian, True, iteration)
-    _differences(function, point, residual, upper, difference, jacobian)
+    if not (secant and foreseen):
+        _differences(function, point, residual, upper, difference, jacobian, threads)
     return Solution(point, residual, jacobian, False, max_iterations)
 
 
 def _differences(
-    function: Callable[[Array], Array], point: Array, residual: Array, upper: Array, difference: float, jacobian: Array
+    function: Callable[[Array], Array],
+    point: Array,
+    residual: Array,
+    upper: Array,
+    difference: float,
+    jacobian: Array,
+    threads: int,
 ) -> None:
     """Forward differences into ``jacobian``; backward where the bound is in the way."""
-    for number in range(point.shape[0]):
+
+    def column(number: int) -> None:
         shift = difference * max(abs(float(point[number])), 1e-3)
         if point[number] + shift > upper[number]:
             shift = -shift
         moved = point.copy()
         moved[number] += shift
         jacobian[:, number] = (function(moved) - residual) / (moved[number] - point[number])
+
+    if threads == 1:
+        for number in range(point.shape[0]):
+            column(number)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in pool.map(column, range(point.shape[0])):
+            pass  # what a thread has raised is raised here
 
 
 def _proposal(normal: Array, gradient: Array, damping: float, point: Array, lower: Array, upper: Array) -> Array:

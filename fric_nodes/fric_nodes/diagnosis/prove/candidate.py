@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -73,8 +72,6 @@ def examine(folder: str, seal: str, entry: str = DIAGNOSE) -> float:
 
     A diagnosis that fails counts as one that said nothing: the failure is written down and scored.
     """
-    # One case per core: threads below would only take each other's time.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     at = Path(folder)
     nominal = read_model(at / "nominal.yaml")
     train, validation = _read(at, nominal)
@@ -98,7 +95,6 @@ def examine(folder: str, seal: str, entry: str = DIAGNOSE) -> float:
 
 def own_fit(folder: str, structure: str, entry: str = DIAGNOSE) -> float:
     """NOE on the validation [%] of the true structure (text of a model file) fitted by the diagnosis; NaN where that fails."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     at = Path(folder)
     kept = at / "own_fit.json"
     if kept.exists():  # of a run that was stopped

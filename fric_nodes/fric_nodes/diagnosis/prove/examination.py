@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 from ...errors import InputError
 from ...files import write_text
+from ...threads import alone
 from .candidate import DIAGNOSE, entered, examine, own_fit
 from .cases import Order, plan
 from .scoring import Outcome, Score, outcome_of, scored
@@ -117,8 +118,8 @@ def _finished(folder: Path, hash_of_key: str) -> bool:
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:
-    """Fresh processes that share nothing with this one; none is started before there is work."""
-    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
+    """Fresh processes, of one thread each, that share nothing with this one; none is started before there is work."""
+    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=alone)
 
 
 def _all(
