@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.threads import alone, linear_algebra_in_one, n_threads
+from fric_nodes.errors import InputError
+from fric_nodes.threads import alone, linear_algebra_in_one, mapped, n_threads
 from threadpoolctl import threadpool_info
 
 
@@ -20,9 +21,22 @@ def of_linear_algebra(info: list[dict[str, Any]]) -> list[int]:
 def test_what_the_environment_asks_for_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FRIC_THREADS", "3")
     assert n_threads() == 3
-    for nonsense in ("", "many", "0", "-2"):
-        monkeypatch.setenv("FRIC_THREADS", nonsense)
-        assert 1 <= n_threads() <= max(os.cpu_count() or 1, 1)
+    monkeypatch.delenv("FRIC_THREADS")
+    assert 1 <= n_threads() <= max(os.cpu_count() or 1, 1)
+
+
+@pytest.mark.parametrize("nonsense", ["many", "0", "-2", "1.5", "²"])
+def test_what_is_no_number_of_threads_is_refused(nonsense: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FRIC_THREADS", nonsense)
+    with pytest.raises(InputError, match=r"FRIC_THREADS: .* is no number of threads"):
+        n_threads()
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_results_keep_their_order_and_what_a_thread_raises_arrives(threads: int) -> None:
+    assert mapped(lambda number: number**2, range(50), threads) == [number**2 for number in range(50)]
+    with pytest.raises(ZeroDivisionError):
+        mapped(lambda number: 1 / number, range(-3, 3), threads)
 
 
 def test_linear_algebra_gets_its_threads_back() -> None:

@@ -7,12 +7,19 @@ the linear algebra between them is small, and threads of its own would only take
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-__all__ = ["alone", "linear_algebra_in_one", "n_threads"]
+from .errors import InputError
+
+__all__ = ["alone", "linear_algebra_in_one", "mapped", "n_threads"]
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 _MOST = 8
 _NAME = "FRIC_THREADS"
@@ -20,9 +27,29 @@ _OF_LIBRARIES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 def n_threads() -> int:
-    """As many as there are cores, at most eight, or what the environment variable FRIC_THREADS says."""
+    """As many as there are cores, at most eight, or what the environment variable FRIC_THREADS says.
+
+    Raises:
+        InputError: that is no number above 0.
+    """
     asked = os.environ.get(_NAME, "")
-    return max(int(asked), 1) if asked.isdigit() else min(os.cpu_count() or 1, _MOST)
+    if not asked:
+        return min(os.cpu_count() or 1, _MOST)
+    if not asked.isdecimal() or int(asked) < 1:
+        raise InputError(_NAME, f"{asked!r} is no number of threads", "set it to 1 or more, or not at all")
+    return int(asked)
+
+
+def mapped(function: Callable[[Item], Result], items: Iterable[Item], threads: int | None = None) -> list[Result]:
+    """``function`` of each of the ``items``, in their order, by ``threads`` threads, by default :func:`n_threads`.
+
+    What one of them raises is raised here.
+    """
+    threads = threads or n_threads()
+    if threads == 1:
+        return [function(item) for item in items]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(function, items))
 
 
 def alone() -> None:

@@ -208,9 +208,10 @@ def _added(tracks: Sequence[Track], growth: Growth, first: Rival | None, tell: C
         if first is not None:
             rivals, last, first = [first], first.screened, None
         else:
-            found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
+            full = len(steps) >= _MOST_TERMS
+            found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance, in_pairs=not full)
             last = found.tried
-            if len(steps) >= _MOST_TERMS or (state.excess < _SAME * state.floor and not worth(state, found.tried)):
+            if full or (state.excess < _SAME * state.floor and not worth(state, found.tried)):
                 break
             rivals = [rival for rival in rivals_of(track, state, found, scales) if earns(state, rival.left, rival.offer)]
             if not rivals:

@@ -13,14 +13,13 @@ need no observer: the force that the term adds along the measured motion (:mod:`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..model import Term
 from ..record import Array, Index
-from ..threads import n_threads
+from ..threads import mapped
 from .along import Along
 from .candidates import Candidate
 from .track import Fit, Track
@@ -205,8 +204,7 @@ def _scales(name: str, trial: Term) -> bool:
 def columns_of(track: Track, fit: Fit, trials: Sequence[Term]) -> list[Column]:
     """The observer's columns of ``trials``, on all cores."""
     jobs = [(trial, part) for trial in trials for part in _parts(trial)]
-    with ThreadPoolExecutor(n_threads()) as pool:
-        residuals = list(pool.map(lambda job: track.residual(fit.model.with_terms((*fit.model.terms, job[1]))), jobs))
+    residuals = mapped(lambda job: track.residual(fit.model.with_terms((*fit.model.terms, job[1]))), jobs)
     found: dict[int, list[Array]] = {}
     for (trial, part), residual in zip(jobs, residuals, strict=True):
         change = residual - fit.residual
@@ -254,8 +252,7 @@ def screen(
 ) -> Screening:
     """Every candidate at first order, alone and, where that is wanted, in pairs, on blocks that it has not seen."""
     quick = Promise(Along(track), fit)
-    with ThreadPoolExecutor(n_threads()) as pool:
-        trials = [trial for kept in pool.map(quick.narrowed, found) for trial in kept]
+    trials = [trial for kept in mapped(quick.narrowed, found) for trial in kept]
     columns = columns_of(track, fit, trials)
     n_free = len(fit.names)
     stacked = [fit.residual[:, None], *(each[:, None] for each in twin_residuals), fit.jacobian]

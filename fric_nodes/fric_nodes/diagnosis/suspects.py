@@ -8,7 +8,6 @@ that its size was not fitted to is its score (:mod:`fric_nodes.diagnosis.screen`
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from ..identification.gauss_newton import Solution
 from ..model import Model, Term
 from ..record import Array, Record
-from ..threads import n_threads
+from ..threads import mapped
 from .along import Along
 from .candidates import candidates, place_of, scales_of
 from .fitting import bounds_of, free_names
@@ -139,8 +138,7 @@ def _present(track: Track, model: Model, missing: Array) -> list[_Suspect]:
         values[at] += step if values[at] + step <= parameter.declaration.upper else -step
         steps.append(float(values[at] - model.values[at]))
         trials.append(model.with_values(values))
-    with ThreadPoolExecutor(n_threads()) as pool:
-        residuals = list(pool.map(track.residual, trials))
+    residuals = mapped(track.residual, trials)
     columns = {name: (residual - missing) / step for name, residual, step in zip(names, residuals, steps, strict=True)}
     return [
         _Suspect(effect, True, component, tuple(columns[name] for name in members), True)

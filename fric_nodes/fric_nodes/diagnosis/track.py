@@ -271,8 +271,8 @@ class Track:
     def n_substeps(self, model: Model, run: Run) -> int:
         """Steps of ``model`` per sample, enough for what the observer sees.
 
-        Bristles and contacts may be far faster than that; with so many steps the missing force differs from that with as many
-        as their rate asks for by less than 1/300 of what is missing.
+        Bristles and contacts may be far faster than that: on the recording ``bags/slide``, with bristles, two steps per sample
+        (400 rad/s, 2 ms) instead of sixteen change what is missing by less than a thousandth of the floor.
         """
         most = min(math.ceil(self.bandwidth * run.sample_time / _STEP_OF_OBSERVER), _MOST_STEPS)
         return min(substeps(model, run.sample_time, _STEP_OF_RATE), most)

@@ -154,9 +154,10 @@ class _Assembly:
         def call(role: str, *first: str) -> str:
             return f"{role}_{number}({', '.join((*first, *parameters))})"
 
-        optional = self._switches is not None and effect.neutral is not None
-        there = f"p[{self._switches + number}] != 0.0" if self._switches is not None and optional else "True"
-        switch = "" if there == "True" else f"if {there}: "
+        there, switch = "True", ""
+        if self._switches is not None and effect.neutral is not None:
+            there = f"p[{self._switches + number}] != 0.0"
+            switch = f"if {there}: "
         if effect.uses_acceleration:
             self.bends.append(there)
         if effect.remember is not None:

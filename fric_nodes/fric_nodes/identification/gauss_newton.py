@@ -15,12 +15,12 @@ Source: Madsen, Nielsen, Tingleff 2004, sections 3.2 and 3.4; the active set is 
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..record import Array
+from ..threads import mapped
 
 __all__ = ["Solution", "minimise"]
 
@@ -147,13 +147,7 @@ def _differences(
         moved[number] += shift
         jacobian[:, number] = (function(moved) - residual) / (moved[number] - point[number])
 
-    if threads == 1:
-        for number in range(point.shape[0]):
-            column(number)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(column, range(point.shape[0])):
-            pass  # what a thread has raised is raised here
+    mapped(column, range(point.shape[0]), threads)
 
 
 def _proposal(normal: Array, gradient: Array, damping: float, point: Array, lower: Array, upper: Array) -> Array:

@@ -10,9 +10,7 @@ Python's lock, one thread for each processor.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -21,6 +19,7 @@ from scipy.stats import qmc
 
 from ..model import Model
 from ..record import Array
+from ..threads import mapped
 from .equations import Equations
 from .free_parameters import FreeParameters
 
@@ -127,10 +126,9 @@ def best_of(
     if len(starts) == 1:
         ends = [to_the_end(starts[0])]
     else:
-        with ThreadPoolExecutor(min(len(starts), os.cpu_count() or 1)) as pool:
-            ends = sorted(pool.map(briefly, starts), key=lambda end: end.cost)
-            promising = [end for end in ends[:_MOST] if end.cost <= _BEHIND * ends[0].cost]
-            ends[: len(promising)] = pool.map(to_the_end, [end.model for end in promising])
+        ends = sorted(mapped(briefly, starts), key=lambda end: end.cost)
+        promising = [end for end in ends[:_MOST] if end.cost <= _BEHIND * ends[0].cost]
+        ends[: len(promising)] = mapped(to_the_end, [end.model for end in promising])
         ends.sort(key=lambda end: end.cost)
     points = np.array([end.model.values[free.index] for end in ends])
     return ends[0], Ends(free.names, points, np.array([end.cost for end in ends]))
