@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +15,7 @@ from fric_nodes.model import build_model, term
 from fric_nodes.model_file import write_model
 from fric_nodes.record import Record
 
-
-def fric(*arguments: object) -> subprocess.CompletedProcess[str]:
-    code = "from fric_nodes.cli.main import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True, timeout=110, check=False
-    )
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 def recording(sign: float = 1.0, scale: float = 1.0) -> Record:
@@ -46,13 +41,13 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: folder / name for name in (*made, "model.yaml")}
 
 
-def test_a_good_recording(bags: dict[str, Path]) -> None:
+def test_a_good_recording(bags: dict[str, Path], fric: Command) -> None:
     done = fric("doctor", bags["good"], "--model", bags["model.yaml"])
     assert done.returncode == 0, done.stdout + done.stderr
     assert "No fault of the recordings was found." in done.stdout
 
 
-def test_a_wrong_sign_and_a_wrong_unit(bags: dict[str, Path]) -> None:
+def test_a_wrong_sign_and_a_wrong_unit(bags: dict[str, Path], fric: Command) -> None:
     done = fric("doctor", bags["turned"], "--json")
     assert done.returncode == 1, done.stderr
     told = json.loads(done.stdout)
@@ -64,13 +59,13 @@ def test_a_wrong_sign_and_a_wrong_unit(bags: dict[str, Path]) -> None:
     assert "kilo" in unit.stdout
 
 
-def test_what_cannot_be_read(tmp_path: Path) -> None:
+def test_what_cannot_be_read(tmp_path: Path, fric: Command) -> None:
     done = fric("doctor", tmp_path / "nowhere")
     assert done.returncode == 2
     assert len([line for line in done.stderr.splitlines() if line.startswith("fric:")]) == 1
 
 
-def test_the_installation() -> None:
+def test_the_installation(fric: Command) -> None:
     done = fric("doctor", "--json")
     told = json.loads(done.stdout)
     states = {item["check"]: (item["verdict"], item["detail"]) for item in told["checks"]}

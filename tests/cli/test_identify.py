@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
+from collections.abc import Callable
 from html import escape
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+Refusal = Callable[..., str]
 MAP = """
 joint: slide
 time:     {from: t, unit: ms}
@@ -19,24 +21,6 @@ effort:   {from: volts, scale: 2.5, unit: N}
 """
 LIMITS = ("--limit", "position=-0.05,0.05", "--limit", "speed=0.3", "--limit", "force=-60,60")
 MASS, COULOMB, VISCOUS, BIAS = 3.0, 6.0, 25.0, 1.5
-
-
-def fric(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command in a process of its own, as a shell would start it."""
-    code = "from fric_nodes.cli.main import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True, timeout=110, check=False
-    )
-
-
-def refusal(*arguments: object) -> str:
-    """The one line with which the command refuses ``arguments``."""
-    done = fric(*arguments)
-    assert done.returncode == 2, done.stderr
-    lines = [line for line in done.stderr.splitlines() if line.startswith("fric:")]
-    assert len(lines) == 1, done.stderr
-    assert "Traceback" not in done.stderr
-    return lines[0]
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +40,7 @@ def csv(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def bag(csv: Path) -> Path:
+def bag(csv: Path, fric: Command) -> Path:
     """The same recording, imported."""
     mapping = csv.with_name("map.yaml")
     mapping.write_text(MAP)
@@ -67,7 +51,7 @@ def bag(csv: Path) -> Path:
     return target
 
 
-def test_identify_finds_the_parameters_and_writes_three_files(bag: Path, tmp_path: Path) -> None:
+def test_identify_finds_the_parameters_and_writes_three_files(bag: Path, tmp_path: Path, fric: Command) -> None:
     done = fric("identify", bag, "--out", tmp_path / "found", "--json")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
@@ -88,7 +72,21 @@ def test_identify_finds_the_parameters_and_writes_three_files(bag: Path, tmp_pat
     assert json.loads(shown.stdout)["joint"] == "slide"
 
 
-def test_a_found_model_is_simulated_under_the_recorded_force(bag: Path, tmp_path: Path) -> None:
+def test_a_process_of_its_own_ends_with_the_status_and_the_line(bag: Path, tmp_path: Path, fric_apart: Command) -> None:
+    """As a shell starts it: the other tests call the command within this process."""
+    done = fric_apart("identify", bag, "--out", tmp_path / "found", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["parameters"]["mass"]["value"] == pytest.approx(MASS, rel=0.03)
+    refused = fric_apart("identify", bag, "--joint", "elbow", "--out", tmp_path / "none")
+    assert refused.returncode == 2
+    assert refused.stdout == ""
+    (line,) = refused.stderr.splitlines()[-1:]
+    assert line.startswith("fric:")
+    assert "elbow" in line
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_found_model_is_simulated_under_the_recorded_force(bag: Path, tmp_path: Path, fric: Command) -> None:
     assert fric("identify", bag, "--out", tmp_path / "found").returncode == 0
     done = fric("simulate", tmp_path / "found" / "model.yaml", "--force", bag, "--out", tmp_path / "free", "--json")
     assert done.returncode == 0, done.stderr
@@ -96,7 +94,7 @@ def test_a_found_model_is_simulated_under_the_recorded_force(bag: Path, tmp_path
     assert json.loads(done.stdout)["position_rmse"] < 0.005
 
 
-def test_validation_is_scored_apart(bag: Path, tmp_path: Path) -> None:
+def test_validation_is_scored_apart(bag: Path, tmp_path: Path, fric: Command, refusal: Refusal) -> None:
     done = fric("identify", bag, "--end", "6", "--out", tmp_path, "--json")
     assert done.returncode == 0, done.stderr
     line = refusal("identify", bag, "--validate", bag, "--out", tmp_path / "same")
@@ -131,7 +129,9 @@ def test_validation_is_scored_apart(bag: Path, tmp_path: Path) -> None:
         (("demo", "--clock", "sundial", "--out", "{out}"), "lock-step"),
     ],
 )
-def test_what_cannot_be_used_is_refused_in_one_line(arguments: tuple[str, ...], says: str, bag: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_used_is_refused_in_one_line(
+    arguments: tuple[str, ...], says: str, bag: Path, tmp_path: Path, refusal: Refusal
+) -> None:
     out = tmp_path / "out"
     filled = [argument.format(bag=bag, out=out) for argument in arguments]
     if filled[0] == "identify":
@@ -140,13 +140,13 @@ def test_what_cannot_be_used_is_refused_in_one_line(arguments: tuple[str, ...], 
     assert not out.exists(), "a refused command must leave nothing behind"
 
 
-def test_bounds_are_kept(bag: Path, tmp_path: Path) -> None:
+def test_bounds_are_kept(bag: Path, tmp_path: Path, fric: Command) -> None:
     done = fric("identify", bag, "--bound", "mass=0.5,2", "--out", tmp_path, "--json")
     assert done.returncode == 0, done.stderr
     assert 0.5 <= json.loads(done.stdout)["parameters"]["mass"]["value"] <= 2.0
 
 
-def test_what_a_recording_cannot_tell_is_said_before_the_fit(csv: Path, tmp_path: Path) -> None:
+def test_what_a_recording_cannot_tell_is_said_before_the_fit(csv: Path, tmp_path: Path, fric: Command) -> None:
     """The same slide going one way only: Coulomb friction and bias are one constant."""
     time = np.arange(0.0, 6.0, 1e-3)
     w = 2.0 * np.pi * 0.7
@@ -168,7 +168,7 @@ def test_what_a_recording_cannot_tell_is_said_before_the_fit(csv: Path, tmp_path
     assert escape(coupled[0]["message"]) in (tmp_path / "found" / "report.html").read_text()
 
 
-def test_a_design_from_a_model_alone_writes_what_the_excitation_node_takes(tmp_path: Path) -> None:
+def test_a_design_from_a_model_alone_writes_what_the_excitation_node_takes(tmp_path: Path, fric: Command) -> None:
     model = tmp_path / "model.yaml"
     model.write_text(
         "format: fric-model/1\njoint: slide\nunits: {position: m, force: N}\nplant: {type: rigid, mass: 2.0}\n"
@@ -188,7 +188,7 @@ def test_a_design_from_a_model_alone_writes_what_the_excitation_node_takes(tmp_p
     assert all(each["kind"] in written for each in found["excitation"])
 
 
-def test_a_mapping_that_does_not_fit_names_the_columns(csv: Path, tmp_path: Path) -> None:
+def test_a_mapping_that_does_not_fit_names_the_columns(csv: Path, tmp_path: Path, refusal: Refusal) -> None:
     mapping = tmp_path / "map.yaml"
     mapping.write_text(MAP.replace("volts", "amps"))
     line = refusal("import", csv, "--map", mapping, "--out", tmp_path / "bag")
@@ -197,7 +197,7 @@ def test_a_mapping_that_does_not_fit_names_the_columns(csv: Path, tmp_path: Path
     assert not (tmp_path / "bag").exists()
 
 
-def test_every_verb_explains_itself_with_an_example() -> None:
+def test_every_verb_explains_itself_with_an_example(fric: Command) -> None:
     listed = fric("--help").stdout
     for verb in ("demo", "node", "import", "record", "play", "simulate", "identify", "model", "bench"):
         assert verb in listed

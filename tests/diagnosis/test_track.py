@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from fric_nodes.diagnosis.track import Track
@@ -14,6 +16,7 @@ MASS, VISCOUS, LACKING = 2.0, 300.0, 5.0
 H = 0.001
 
 
+@cache
 def recorded() -> Record:
     """An axis in thick oil against a constant force, by an integrator of scipy."""
     time = np.arange(8000) * H

@@ -73,7 +73,16 @@ class _Loop:
         self.plant: Complex = np.asarray(plant, dtype=np.complex128)
         self.integral: Complex = period * z / (z - 1.0)
         self.derivative: Complex = (z - 1.0) / ((filter_time + period) * z - filter_time)
-        self._filter_time = filter_time
+        t = filter_time
+        integrator, lag = _coefficients(1.0, -1.0), _coefficients(t + period, -t)
+        # The closed loop's polynomial is linear in the gains; without integral gain the integrator's own pole takes no part.
+        self._free = np.polymul(lag, self._denominator)
+        self._by_gain = [np.polymul(part, self._numerator) for part in (lag, integrator)]
+        self._with_integrator = np.polymul(integrator, self._free)
+        self._by_gain_with_integrator = [
+            np.polymul(part, self._numerator)
+            for part in (np.polymul(integrator, lag), period * np.polymul([1.0, 0.0], lag), np.polymul(integrator, integrator))
+        ]
 
     def ratio(self, kp: float, ki: float, kd: float) -> Complex:
         """L at the grid's frequencies."""
@@ -81,16 +90,13 @@ class _Loop:
 
     def stable(self, kp: float, ki: float, kd: float) -> bool:
         """True when all closed-loop poles lie inside the unit circle."""
-        h, t = self.period, self._filter_time
-        integrator, lag = _coefficients(1.0, -1.0), _coefficients(t + h, -t)
-        controller = kp * np.polymul(integrator, lag)
-        controller = np.polyadd(controller, ki * h * np.polymul([1.0, 0.0], lag))
-        controller = np.polyadd(controller, kd * np.polymul(integrator, integrator))
-        left = np.polymul(np.polymul(integrator, lag), self._denominator)
-        right = np.polymul(controller, self._numerator)
-        if ki == 0.0:  # the integrator's own pole takes no part
-            left, right = np.polydiv(left, integrator)[0], np.polydiv(right, integrator)[0]
-        return bool(np.all(np.abs(np.roots(np.polyadd(left, right))) < 1.0))
+        closed, parts = self._free.copy(), [(kp, self._by_gain[0]), (kd, self._by_gain[1])]
+        if ki != 0.0:
+            closed = self._with_integrator.copy()
+            parts = list(zip((kp, ki, kd), self._by_gain_with_integrator, strict=True))
+        for gain, part in parts:
+            closed[closed.shape[0] - part.shape[0] :] += gain * part
+        return bool(np.all(np.abs(np.roots(closed)) < 1.0))
 
     def peaks(self, kp: float, ki: float, kd: float) -> tuple[float, float]:
         """Largest |S| and |T|."""

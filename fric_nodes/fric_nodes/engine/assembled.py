@@ -12,6 +12,7 @@ from ..effect import Context
 
 __all__ = [
     "ACCELERATION",
+    "ELASTIC",
     "MEMORY",
     "N_STATES",
     "RIGID",
@@ -41,6 +42,9 @@ RIGID = True
 
 ACCELERATION = False
 """True when a term depends on the sign of the acceleration."""
+
+ELASTIC = False
+"""True when a term of the transmission gives a force, so that motor and load are two bodies always."""
 
 MEMORY = False
 """True when a term of the contact has memory."""

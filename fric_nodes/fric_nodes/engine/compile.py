@@ -209,6 +209,7 @@ def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
         *parts.imports,
         f"RIGID = {all(effect.slip is None for effect in effects)}",
         f"ACCELERATION = {any(effect.uses_acceleration for effect in effects)}",
+        f"ELASTIC = {any(effect.link is not None for effect in effects)}",
         f"MEMORY = {any(effect.remember is not None for effect in effects)}",
         f"N_STATES = {len(plant.states)}",
         f"SEEN, SEEN_RATE = {plant.encoder}",

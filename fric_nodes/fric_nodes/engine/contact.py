@@ -57,29 +57,35 @@ def solve(
 ) -> tuple[float, float]:
     """Mean velocity over the step and mean friction force, for sliding towards ``side`` throughout.
 
-    The second half of ``z_next`` keeps the states of the trial before.
+    The second half of ``z_next`` keeps the states of the trial before. All trials go through one call of :func:`opposing`,
+    since all terms are compiled once for each call that there is.
     """
     n = s.z.shape[0]
     half = h * (0.5 / m)
-    bend = 0.0
-    if ACCELERATION and bends(p):
-        force_up, friction_up = opposing(p, s, q, v, h, side, 1.0, around)
-        force_down, friction_down = opposing(p, s, q, v, h, side, -1.0, around)
-        if u - force_up - friction_up > 0.0:
-            bend = 1.0
-        elif u - force_down - friction_down < 0.0:
-            bend = -1.0
-        else:
-            return v, u - force_up
-    w_a = v
-    force_a, friction_a = opposing(p, s, q, w_a, h, side, bend, around)
-    w_b = v + half * (u - force_a - friction_a)
-    change = abs(w_b - v)
-    for _ in range(50):
-        if not RIGID:
+    which = ACCELERATION and bends(p)  # is it still open which way the velocity bends?
+    bend = 1.0 if which else 0.0
+    first = True
+    force_up = 0.0
+    w_a = w_b = v
+    force_a = friction_a = change = 0.0
+    for _ in range(53):
+        if not RIGID and not first:
             for j in range(n):
                 s.z_next[n + j] = s.z_next[j]
         force_b, friction_b = opposing(p, s, q, w_b, h, side, bend, around)
+        if first:
+            rest = u - force_b - friction_b
+            if which and bend > 0.0 and not rest > 0.0:
+                bend = -1.0
+                force_up = force_b
+                continue
+            if which and bend < 0.0 and not rest < 0.0:
+                return v, u - force_up
+            first = False
+            w_b = v + half * rest
+            change = abs(w_b - v)
+            force_a, friction_a = force_b, friction_b
+            continue
         excess = w_b - v - half * (u - force_b - friction_b)
         rise = w_b - w_a + half * (force_b - force_a + friction_b - friction_a)
         share = -excess / rise if rise != 0.0 else 0.0
@@ -143,10 +149,7 @@ def slide(p: Any, m: float, x: Any, x_next: Any, s: Inner, u: float, h: float, a
                     return push
                 impulse += push * left
                 break
-            # Apart from the moving body's, so that nothing has to be chosen on the way from one velocity to the next.
-            w, friction = solve(p, m, s, q, 0.0, u, left, side, around)
-        else:
-            w, friction = solve(p, m, s, q, v, u, left, side, around)
+        w, friction = solve(p, m, s, q, v, u, left, side, around)
         v_1 = 2.0 * w - v
         if v_1 * side >= 0.0:
             q += left * w

@@ -33,7 +33,7 @@ import math
 from typing import Any
 
 from ..effect import Context
-from .assembled import RIGID, Inner, Surroundings, link, play
+from .assembled import ELASTIC, RIGID, Inner, Surroundings, link, play
 from .contact import CONTACT_FUNCTIONS, contact_step, opposing, slide, solve
 from .kernel import kernel
 
@@ -253,11 +253,9 @@ def driven_step(
     """
     alone = (*p, 0.0)
     motor = (m_m, dry, viscous)
-    free = play(alone)
-    far = free + 1.0
-    if link(far, far, h, alone) == 0.0:
-        return rigid_step(alone, motor, m_l, 0.5 * free, x, x_next, s, u, h, around)
-    return elastic_step(alone, motor, m_l, x, x_next, s, u, h, around)
+    if ELASTIC:
+        return elastic_step(alone, motor, m_l, x, x_next, s, u, h, around)
+    return rigid_step(alone, motor, m_l, 0.5 * play(alone), x, x_next, s, u, h, around)
 
 
 TRANSMISSION_FUNCTIONS = (

@@ -21,6 +21,7 @@ TURN = 0.3125
 """How far a change from +v to -v within T goes on before it turns, over v T."""
 
 _DEGREE = 6
+_PADDING = (0.0,) * (_DEGREE + 1)
 
 
 class Piecewise:
@@ -32,7 +33,7 @@ class Piecewise:
     def __init__(self) -> None:
         self._starts: list[float] = []
         self._spans: list[float] = []
-        self._pieces: list[Array] = []
+        self._pieces: list[tuple[float, ...]] = []
         self._arrays: tuple[Array, Array, Array] | None = None
         self.duration = 0.0
         self.position = 0.0
@@ -41,11 +42,9 @@ class Piecewise:
     def _add(self, span: float, coefficients: list[float]) -> None:
         if span <= 0.0:
             return
-        padded = np.zeros(_DEGREE + 1)
-        padded[: len(coefficients)] = coefficients
         self._starts.append(self.duration)
         self._spans.append(span)
-        self._pieces.append(padded)
+        self._pieces.append((*coefficients, *_PADDING[len(coefficients) :]))
         self._arrays = None
         self.duration += span
 
