@@ -34,7 +34,7 @@ from .fitting import best_track, bounds_of, free_names, refit
 from .grow import Growth, grow
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
-from .rivals import FAR_OFF, implausible
+from .rivals import FAR_OFF, mass_off
 from .screen import Tried
 from .settle import FLOOR_KNOWN, Step
 from .track import Fit, Track
@@ -214,7 +214,7 @@ def _concluded(
     findings = [_finding(validation, held, growth, end, step, scored, scales, rest) for step in growth.steps]
     likely, stand_in = None, False
     # What needs a mass twice or half as large as the given one is no explanation.
-    far_off = min(implausible(mass, end) for mass in (track.mass, nominal.total_inertia)) > FAR_OFF
+    far_off = min(mass_off(mass, end) for mass in (track.mass, nominal.total_inertia)) > FAR_OFF
     if missing and (rest > _SIGNED or not findings or far_off or growth.beyond > 0.0):
         likely, of_all = _signature_of(tracks, growth, rest)
         # Where one signature explains more than several effects do together, these have only stood in for it.

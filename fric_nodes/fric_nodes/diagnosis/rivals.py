@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..effect import Effect
 from ..model import Model, ModelError
 from .along import Along
 from .candidates import Scales
-from .fitting import State, bounds_of, fitted_with, unseen
+from .fitting import State, bounds_of, fitted_with, is_driven, unseen
 from .screen import Screening, Tried
 from .track import Fit, Track
 
@@ -22,6 +22,7 @@ __all__ = [
     "Rival",
     "earns",
     "implausible",
+    "mass_off",
     "name_of",
     "price_of",
     "rivals_of",
@@ -29,6 +30,7 @@ __all__ = [
 ]
 
 FAR_OFF = 0.1  # of what is missing, for a mass twice or half the one that was given
+_LEAST_SHARE = 0.1  # of the mass behind a spring: half of it counts as much as a mass twice the given one
 _PAIRS_FITTED = 2
 _PAIR_BETTER = 0.5  # of what the best single effect leaves, for a pair to be tried
 PER_PARAMETER = 0.012  # of what is missing
@@ -47,21 +49,31 @@ class Rival:
         effect: the first one.
         left: sum of squares on unseen blocks [F^2].
         fit: of the model with it.
-        score: ``left`` and a price for each parameter [F^2]; what is small beside the rest must not decide between effects.
+        fair: ``left`` as it is held against that of other rivals [F^2].
+        dear: price of its parameters, and of what is implausible about it [F^2]; what is small beside the rest must not decide
+            between effects.
         offer: the trials that it was fitted from.
         names: of its terms in the fitted model.
         halfway: what the first of a pair leaves alone [F^2].
         screened: all candidates at first order then, the best first.
+        slips: True where it has slip dynamics.
     """
 
     effect: Effect
     left: float
     fit: Fit
-    score: float
+    fair: float
+    dear: float
     offer: tuple[Tried, ...]
     names: tuple[str, ...]
     halfway: float
     screened: tuple[Tried, ...]
+    slips: bool
+
+    @property
+    def score(self) -> float:
+        """What it leaves and what it costs [F^2]."""
+        return self.fair + self.dear
 
 
 def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> list[Rival]:
@@ -85,10 +97,23 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> l
         except ModelError:
             continue
         fitted.append(_rival(track, state, offer, fit, found))
-    fitted.sort(key=lambda rival: rival.score)
+    fitted = _side_by_side(track, fitted, found.unpaid)
     for k, rival in enumerate(fitted[:2]):
         fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds_of(rival.fit.model, scales))
         fitted[k] = _rival(track, state, rival.offer, fit, found)
+    return _side_by_side(track, fitted, found.unpaid)
+
+
+def _side_by_side(track: Track, fitted: Sequence[Rival], unpaid: float) -> list[Rival]:
+    """Rivals, the best first, those with slip dynamics held against the best of the others as the same observer sees both.
+
+    How much less is seen to be missing where the position is set depends on what is missing: after a fit it is no more what it
+    was before, ``unpaid`` [1].
+    """
+    pushed = [rival for rival in fitted if not rival.slips]
+    if len(pushed) < len(fitted) and pushed and unpaid > 1.0:
+        now = min(track.unpaid(min(pushed, key=lambda rival: rival.score).fit.model), unpaid)
+        fitted = [replace(rival, fair=rival.left * now / unpaid) if rival.slips else rival for rival in fitted]
     return sorted(fitted, key=lambda rival: rival.score)
 
 
@@ -99,7 +124,7 @@ def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, found
     dear = sum(price_of(effect, state.excess) for effect in effects) + state.excess * implausible(track.mass, fit.model)
     names = [name_of(fit.model, effect) for effect in effects]
     halfway = min((each.left for each in offer), default=left)
-    return Rival(effects[0], left, fit, left + dear, offer, tuple(names), max(halfway, left), found.tried)
+    return Rival(effects[0], left, fit, left, dear, offer, tuple(names), max(halfway, left), found.tried, slips)
 
 
 def price_of(effect: Effect, excess: float) -> float:
@@ -108,6 +133,16 @@ def price_of(effect: Effect, excess: float) -> float:
 
 
 def implausible(mass: float, model: Model) -> float:
+    """What speaks against ``model`` whatever it explains, as a share of what is missing.
+
+    That is a mass far from a ``mass`` [F s^2/x] that was given, and a transmission with hardly any mass behind it: between a
+    spring that ends at a body and one that ends at friction, the first micrometres of a contact, no recording decides there.
+    """
+    share = model.value("load_share") if is_driven(model) else 1.0
+    return mass_off(mass, model) + FAR_OFF * max(math.log2(_LEAST_SHARE / share), 0.0) ** 2
+
+
+def mass_off(mass: float, model: Model) -> float:
     """What it speaks against ``model`` to be far from a ``mass`` [F s^2/x] that was given, as a share of what is missing.
 
     A body that is far too light under a force that is taken away from it lacks little, whatever the machine does.

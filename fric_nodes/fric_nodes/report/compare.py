@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..diagnosis.compare import Comparison
-from .figures import COLOURS, Curve, stacked
+from .figures import Curve, shaded, stacked
 from .numbers import significant
 from .page import Section, bullets, figure, paragraph, render, table, tiles
 
@@ -61,8 +61,7 @@ def _figures(found: Comparison) -> Section:
     panels.append((f"difference of {by} [{unit}]", [Curve("simulated minus real", found.time, simulated - real, "before")]))
     plot = stacked(panels, "time [s]", height=190)
     spans = found.where.time[0] if found.where is not None and found.where.time else ()
-    for first, last in sorted(spans, key=lambda span: span[0] - span[1])[:_MOST_SPANS]:
-        plot.add_vrect(x0=first, x1=last, fillcolor=COLOURS["before"], opacity=0.13, line_width=0, layer="below")
+    shaded(plot, sorted(spans, key=lambda span: span[0] - span[1])[:_MOST_SPANS])
     caption = "Drag to zoom, double click to go back."
     if found.where is not None:
         caption += f" Shaded: where {100 * found.where.share:.0f} % of the energy of the difference sits."

@@ -12,7 +12,7 @@ from ..diagnosis.track import smooth
 from ..model_file import model_to_text
 from ..record import Array, Record
 from .checks import checks_section
-from .figures import COLOURS, Curve, scatter_and_curves, stacked
+from .figures import Curve, scatter_and_curves, shaded, stacked
 from .numbers import significant
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 
@@ -81,9 +81,7 @@ def _spans(found: Diagnosis, number: int) -> list[tuple[float, float]]:
 
 def _shaded(plot: go.Figure, spans: Sequence[tuple[float, float]], low: float, high: float) -> go.Figure:
     inside = [span for span in spans if span[1] >= low and span[0] <= high]
-    for first, last in sorted(inside, key=lambda span: span[0] - span[1])[:_MOST_SPANS]:
-        plot.add_vrect(x0=first, x1=last, fillcolor=COLOURS["before"], opacity=0.13, line_width=0, layer="below")
-    return plot
+    return shaded(plot, sorted(inside, key=lambda span: span[0] - span[1])[:_MOST_SPANS])
 
 
 def _curves(found: Diagnosis, p: Prediction, use: slice) -> list[Curve]:

@@ -5,7 +5,7 @@ Long signals are thinned to the smallest and largest value of each of a few thou
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,7 +15,7 @@ from plotly.subplots import make_subplots
 
 from ..record import Array
 
-__all__ = ["COLOURS", "Curve", "scatter_and_curves", "stacked", "thinned"]
+__all__ = ["COLOURS", "Curve", "scatter_and_curves", "shaded", "stacked", "thinned"]
 
 COLOURS: Mapping[str, str] = {
     "measured": "#8593a3",
@@ -88,6 +88,27 @@ def stacked(panels: Sequence[tuple[str, Sequence[Curve]]], x_label: str, height:
         plot.update_yaxes(title_text=label, row=row, col=1)
     plot.update_xaxes(title_text=x_label, row=len(panels), col=1)
     return _layout(plot, 60 + height * len(panels))
+
+
+def shaded(plot: go.Figure, spans: Iterable[tuple[float, float]]) -> go.Figure:
+    """``plot`` with the ``spans`` of its x axis shaded in every panel.
+
+    All at once: the library's own way looks through the figure for each span anew, which took most of a report's time.
+    """
+    look = {
+        "type": "rect",
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": COLOURS["before"],
+        "opacity": 0.13,
+        "layer": "below",
+        "line_width": 0,
+    }
+    panels = sorted({(trace.xaxis or "x", trace.yaxis or "y") for trace in plot.data})
+    plot.layout.shapes = [
+        {**look, "xref": x, "yref": f"{y} domain", "x0": first, "x1": last} for first, last in spans for x, y in panels
+    ]
+    return plot
 
 
 def scatter_and_curves(

@@ -22,7 +22,7 @@ from ..diagnosis.result import Diagnosis, Finding, Prediction
 from ..diagnosis.track import smooth
 from ..model import Model
 from ..record import Array, Record
-from ..report.figures import COLOURS, Curve, scatter_and_curves, stacked
+from ..report.figures import Curve, scatter_and_curves, shaded, stacked
 from ..report.numbers import significant
 from .verification import Evidence
 
@@ -158,10 +158,8 @@ def _difference(found: Diagnosis, p: Prediction) -> go.Figure:
     ]
     plot = stacked([(f"force [{found.given.units.force}]", curves)], "time [s]", 320)
     spans = found.findings[0].where.time if found.findings else ()
-    for low, high in spans[0] if spans else ():
-        if high >= p.time[use][0] and low <= p.time[use][-1]:
-            plot.add_vrect(x0=low, x1=high, fillcolor=COLOURS["before"], opacity=0.13, line_width=0, layer="below")
-    return plot
+    inside = [span for span in (spans[0] if spans else ()) if span[1] >= p.time[use][0] and span[0] <= p.time[use][-1]]
+    return shaded(plot, inside)
 
 
 def _means(x: Array, y: Array) -> tuple[Array, Array]:
