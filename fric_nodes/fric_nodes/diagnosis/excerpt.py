@@ -121,6 +121,10 @@ def _restricted(track: Track, spans: Index) -> Track:
     return held
 
 
+def _share(left: float) -> str:
+    return f"{100.0 * left:.3g} %" if left > 0.0 else "no more than noise does"
+
+
 def confirmed(found: Excerpt, growth: Growth) -> tuple[Growth, str]:
     """What was grown on the excerpt, fitted to all samples, and what that says about the excerpt.
 
@@ -133,5 +137,5 @@ def confirmed(found: Excerpt, growth: Growth) -> tuple[Growth, str]:
     left = end.excess / max(begin.excess, 1e-300)
     text = found.text
     if growth.steps:
-        text += f"; it leaves {100.0 * left:.3g} % of what is missing there, {100.0 * here:.3g} % in the excerpt"
+        text += f"; of what is missing it leaves {_share(left)} there, {_share(here)} in the excerpt"
     return replace(growth, track=track, begin=begin, end=end), text
