@@ -16,6 +16,7 @@ gains is this module's own. The delayed discretisation follows Astrom and Witten
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,7 +66,6 @@ class _Loop:
     """The open loop without its gains: one plant, one period, one delay, on one grid of frequencies."""
 
     def __init__(self, mass: float, damping: float, period: float, delay: float, filter_time: float, decades: int) -> None:
-        self.period = period
         self.omega: Array = np.geomspace(10.0**-decades, 1.0, 100 * decades**2, dtype=np.float64) * math.pi / period
         z = np.exp(1j * self.omega * period)
         self._numerator, self._denominator = _plant(mass, damping, period, delay)
@@ -73,16 +73,19 @@ class _Loop:
         self.plant: Complex = np.asarray(plant, dtype=np.complex128)
         self.integral: Complex = period * z / (z - 1.0)
         self.derivative: Complex = (z - 1.0) / ((filter_time + period) * z - filter_time)
-        t = filter_time
-        integrator, lag = _coefficients(1.0, -1.0), _coefficients(t + period, -t)
-        # The closed loop's polynomial is linear in the gains; without integral gain the integrator's own pole takes no part.
-        self._free = np.polymul(lag, self._denominator)
-        self._by_gain = [np.polymul(part, self._numerator) for part in (lag, integrator)]
-        self._with_integrator = np.polymul(integrator, self._free)
-        self._by_gain_with_integrator = [
-            np.polymul(part, self._numerator)
-            for part in (np.polymul(integrator, lag), period * np.polymul([1.0, 0.0], lag), np.polymul(integrator, integrator))
-        ]
+        # The closed loop's polynomial is the one without gains and, by each of k_p, k_i and k_d, another. Without integral gain
+        # the integrator's own pole takes no part in the loop.
+        integrator, lag = _coefficients(1.0, -1.0), _coefficients(filter_time + period, -filter_time)
+        held = np.polymul(_coefficients(period, 0.0), lag)
+        self._proportional = self._closed(lag, (lag, _coefficients(0.0), integrator))
+        self._integrating = self._closed(
+            np.polymul(integrator, lag), (np.polymul(integrator, lag), held, np.polymul(integrator, integrator))
+        )
+
+    def _closed(self, controller: Array, by_gain: Sequence[Array]) -> tuple[Array, list[Array]]:
+        """Closed-loop polynomials: without gains, and by each gain; of denominator and numerators of the controller."""
+        parts: list[Array] = [np.asarray(np.polymul(part, self._numerator), dtype=np.float64) for part in by_gain]
+        return np.asarray(np.polymul(controller, self._denominator), dtype=np.float64), parts
 
     def ratio(self, kp: float, ki: float, kd: float) -> Complex:
         """L at the grid's frequencies."""
@@ -90,11 +93,9 @@ class _Loop:
 
     def stable(self, kp: float, ki: float, kd: float) -> bool:
         """True when all closed-loop poles lie inside the unit circle."""
-        closed, parts = self._free.copy(), [(kp, self._by_gain[0]), (kd, self._by_gain[1])]
-        if ki != 0.0:
-            closed = self._with_integrator.copy()
-            parts = list(zip((kp, ki, kd), self._by_gain_with_integrator, strict=True))
-        for gain, part in parts:
+        alone, by_gain = self._integrating if ki != 0.0 else self._proportional
+        closed = alone.copy()
+        for gain, part in zip((kp, ki, kd), by_gain, strict=True):
             closed[closed.shape[0] - part.shape[0] :] += gain * part
         return bool(np.all(np.abs(np.roots(closed)) < 1.0))
 

@@ -56,7 +56,6 @@ class Rival:
         names: of its terms in the fitted model.
         halfway: what the first of a pair leaves alone [F^2].
         screened: all candidates at first order then, the best first.
-        slips: True where it has slip dynamics.
     """
 
     effect: Effect
@@ -68,7 +67,11 @@ class Rival:
     names: tuple[str, ...]
     halfway: float
     screened: tuple[Tried, ...]
-    slips: bool
+
+    @property
+    def slips(self) -> bool:
+        """True where it brings slip dynamics."""
+        return _slips(self.offer)
 
     @property
     def score(self) -> float:
@@ -119,12 +122,15 @@ def _side_by_side(track: Track, fitted: Sequence[Rival], unpaid: float) -> list[
 
 def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, found: Screening) -> Rival:
     effects = [each.column.term.effect for each in offer]
-    slips = any(effect.slip is not None for effect in effects)
-    left = unseen(track, fit, fit.residual) * (found.unpaid if slips else 1.0)
+    left = unseen(track, fit, fit.residual) * (found.unpaid if _slips(offer) else 1.0)
     dear = sum(price_of(effect, state.excess) for effect in effects) + state.excess * implausible(track.mass, fit.model)
     names = [name_of(fit.model, effect) for effect in effects]
     halfway = min((each.left for each in offer), default=left)
-    return Rival(effects[0], left, fit, left, dear, offer, tuple(names), max(halfway, left), found.tried, slips)
+    return Rival(effects[0], left, fit, left, dear, offer, tuple(names), max(halfway, left), found.tried)
+
+
+def _slips(offer: Sequence[Tried]) -> bool:
+    return any(each.column.term.effect.slip is not None for each in offer)
 
 
 def price_of(effect: Effect, excess: float) -> float:
