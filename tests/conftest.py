@@ -1,46 +1,69 @@
-"""What all tests share: those on published recordings run where the recordings are, and say so where they are not."""
+"""What all tests share: what is left out unless it is asked for, those that take long or need recordings, and is said to be."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
-_REASON = (
-    "tests on published recordings need the environment variable FRIC_DATA (the folder that holds emps/, tiago_torso/, ...)"
-)
-_LEFT_OUT = pytest.StashKey[int]()
+_LEFT_OUT = pytest.StashKey[dict[str, int]]()
+
+
+class _Kind(NamedTuple):
+    """Tests that run when they are asked for."""
+
+    about: str
+    asked: Callable[[pytest.Config], bool]
+    how: str
+
+
+_KINDS = {
+    "real_data": _Kind(
+        "reads published recordings from the folder FRIC_DATA",
+        lambda _: bool(os.environ.get("FRIC_DATA")),
+        "set the environment variable FRIC_DATA to the folder that holds emps/, tiago_torso/, ...",
+    ),
+    "long": _Kind("takes half a minute or more", lambda config: bool(config.getoption("--long")), "give --long"),
+}
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--long", action="store_true", help="also those tests that take half a minute or more each")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "real_data: reads published recordings from the folder FRIC_DATA")
+    for name, kind in _KINDS.items():
+        config.addinivalue_line("markers", f"{name}: {kind.about}")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    left_out = [item for item in items if item.get_closest_marker("real_data")]
-    if left_out and not os.environ.get("FRIC_DATA"):
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if not item.get_closest_marker("real_data")]
-        config.stash[_LEFT_OUT] = len(left_out)
+    count: dict[str, int] = {}
+    for name, kind in _KINDS.items():
+        left_out = [item for item in items if item.get_closest_marker(name)]
+        if left_out and not kind.asked(config):
+            config.hook.pytest_deselected(items=left_out)
+            items[:] = [item for item in items if not item.get_closest_marker(name)]
+            count[name] = len(left_out)
+    config.stash[_LEFT_OUT] = count
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     if hasattr(session.config, "workeroutput"):  # a process of pytest-xdist: the one that reports collects nothing
-        session.config.workeroutput["left_out"] = session.config.stash.get(_LEFT_OUT, 0)
+        session.config.workeroutput["left_out"] = session.config.stash.get(_LEFT_OUT, {})
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:
-    node.config.stash[_LEFT_OUT] = getattr(node, "workeroutput", {}).get("left_out", 0)
+    node.config.stash[_LEFT_OUT] = getattr(node, "workeroutput", {}).get("left_out", {})
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    count = config.stash.get(_LEFT_OUT, 0)
-    if count:
-        terminalreporter.write_line(f"{count} tests deselected: {_REASON}")
+    for name, count in config.stash.get(_LEFT_OUT, {}).items():
+        terminalreporter.write_line(f"{count} tests left out ({_KINDS[name].about}): to run them, {_KINDS[name].how}")
 
 
 @pytest.fixture

@@ -105,6 +105,7 @@ class Effect:
         source: paper and equation number.
         parameters: in the order in which the compiled functions take them.
         usual: True for the law that is meant when a model names none; without one it is the first by file name.
+        near: another law of the effect that this one comes so near that a diagnosis tries only that; ``""``: none does.
         order: within its place, what comes first: 0 what adds up, 10 what lags, 20 what depends on direction, 30 what scales
             the rest.
         level: see the module's docstring, as for all compiled functions; None when the effect doesn't contribute there.
@@ -136,6 +137,7 @@ class Effect:
     parameters: tuple[Parameter, ...]
     law: str = ""
     usual: bool = False
+    near: str = ""
     order: int = 0
     level: Compiled | None = None
     force: Compiled | None = None

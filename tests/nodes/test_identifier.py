@@ -218,7 +218,9 @@ terms:
 CHANGE_AT = 12.0  # [s]
 
 
-@pytest.mark.parametrize("estimator", ["rls", "ekf", "ukf"])
+@pytest.mark.parametrize(
+    "estimator", ["rls", pytest.param("ekf", marks=pytest.mark.long), pytest.param("ukf", marks=pytest.mark.long)]
+)
 def test_it_follows_a_step_of_friction_in_a_running_graph(graph: Any, tmp_path: Path, estimator: str) -> None:
     for name, level in (("before", 6.0), ("after", 9.0)):
         (tmp_path / f"{name}.yaml").write_text(AXIS.format(level=level))

@@ -159,6 +159,6 @@ def test_the_first_message_of_one_topic_waits_for_that_of_another() -> None:
     assert order.release(1005 * MS) == []
     order.add(0, stamped(0), 1006 * MS)
     assert order.release(1010 * MS) == []  # the third may still be on its way
-    order.add(1, stamped(MS), 1190 * MS)
-    order.add(0, stamped(MS), 1195 * MS)
-    assert [message[1] for message in order.release(1201 * MS)] == [0, 1, 0, 1]
+    order.add(1, stamped(MS), 1990 * MS)
+    order.add(0, stamped(MS), 1995 * MS)
+    assert [message[1] for message in order.release(2001 * MS)] == [0, 1, 0, 1]

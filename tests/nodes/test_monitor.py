@@ -119,7 +119,7 @@ def stamp(message: Mismatch) -> float:
     ("after", "force_from", "component", "effects"),
     [
         (axis(amplitude=0.6), "joint_states", "guideway friction", {"position_dependence"}),
-        (axis(lag=0.006), "force_command", "command path", {"actuator_lag", "delay"}),
+        pytest.param(axis(lag=0.006), "force_command", "command path", {"actuator_lag", "delay"}, marks=pytest.mark.long),
     ],
     ids=["friction at one place", "a slower actuator"],
 )

@@ -14,9 +14,16 @@ from fric_nodes.report.verification import verification_page
 from fric_nodes.verification import VERIFICATIONS
 from fric_nodes.verification.verification import Evidence, Verification
 
+_LONG = {"amthor", "asperity-dwell", "asperity-velocity", "calibration", "free-oscillation"}
+_LONG |= {"online", "passivity", "stick-slip", "transmission"}
 
-# The concealed cases are whole diagnoses, a minute each: `fric verify concealed_...` runs them.
-@pytest.mark.parametrize("name", [name for name in VERIFICATIONS if not name.startswith("concealed")])
+
+def _marks(name: str) -> list[pytest.MarkDecorator]:
+    # The concealed cases are whole diagnoses, a minute each.
+    return [pytest.mark.long] if name in _LONG or name.startswith("concealed") else []
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=_marks(name)) for name in VERIFICATIONS])
 def test_it_reaches_its_goals(name: str) -> None:
     check = VERIFICATIONS[name]
     evidence = check.run()

@@ -54,15 +54,16 @@ class Along:
     def fitted(self, model: Model, names: Sequence[str], scale: Array, bounds: Bounds) -> Model:
         """``model`` with the parameters ``names``, of the sizes ``scale``, such that it lacks least along the motion."""
         return fitted_values(
-            self.residual,
+            lambda trial: self.residual(trial)[:: self.stride],  # of a low-passed force, as many as tell something
             model,
             names,
             scale,
             bounds,
             difference=1e-3,
             point_tolerance=1e-3,
-            cost_tolerance=1e-4,
+            cost_tolerance=1e-3,
             max_iterations=_ITERATIONS,
+            secant=True,
         )[0]
 
     def changes(self, model: Model, names: Sequence[str], scale: Array) -> Array:

@@ -230,6 +230,8 @@ def _lengths(parameter: Parameter, scales: Scales) -> Array:
         return np.linspace(scales.low, scales.high, 13)[1:-1]
     if parameter.name == "gap":
         return np.geomspace(max(3.0 * scales.grain, 1e-5 * scales.travel), 0.03 * scales.travel, 6)
+    if parameter.name == "length":
+        return np.geomspace(max(10.0 * scales.grain, 1e-4 * scales.travel), 0.03 * scales.travel, 5)  # contacts creep little
     return scales.travel * np.geomspace(0.01, 0.2, 3)
 
 

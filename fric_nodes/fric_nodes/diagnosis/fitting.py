@@ -17,7 +17,7 @@ from .screen import Gram, Tried, blocks_of, restraint
 from .track import Bounds, Fit, Track
 from .twin import twins
 
-__all__ = ["State", "best_track", "bounds_of", "fitted_with", "free_names", "is_driven", "refit", "unseen"]
+__all__ = ["Beginning", "State", "begun", "best_track", "bounds_of", "free_names", "is_driven", "refit", "unseen"]
 
 _TWINS = 3
 _CLEAR = 25.0  # times the floor
@@ -64,39 +64,48 @@ def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
     fit = track.fit(model, free_names(model), max_iterations, bounds_of(model, scales_of(track)))
     made = twins(track, fit.model, _TWINS)
     chance = tuple(track.residual(fit.model, twin) for twin in made)
-    floor = float(np.mean([_within_reason(track, fit, each) for each in chance]))
-    return State(fit, _within_reason(track, fit, fit.residual), floor, chance)
-
-
-def _within_reason(track: Track, fit: Fit, residual: Array) -> float:
-    """:func:`unseen`, for a model that is there: more than twice what it leaves where it was fitted is first order's fault."""
-    return min(unseen(track, fit, residual), _INFLATION * float(residual @ residual))
+    floor = float(np.mean([unseen(track, fit, each) for each in chance]))
+    return State(fit, unseen(track, fit, fit.residual), floor, chance)
 
 
 def unseen(track: Track, fit: Fit, residual: Array) -> float:
-    """Sum of squares of ``residual`` on blocks left out of the fit in turn [F^2]."""
+    """Sum of squares of ``residual`` on blocks left out of the fit in turn [F^2].
+
+    It is reckoned at first order, whose fault is what is more than twice what is left where it was fitted.
+    """
     columns = np.concatenate([residual[:, None], fit.jacobian], axis=1)
     held = np.full(columns.shape[1], restraint(track, fit))
     gram = Gram(columns, blocks_of(track, columns.shape[0]), held)
-    return gram.left(0, range(1, columns.shape[1]))
+    return min(gram.left(0, range(1, columns.shape[1])), _INFLATION * float(residual @ residual))
 
 
-def fitted_with(
-    track: Track, fit: Fit, tried: Sequence[Tried], scales: Scales, max_iterations: int = 12, along: Along | None = None
-) -> Fit:
-    """The fitted model with the candidates, everything fitted together.
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """A fitted model with candidates, before everything is fitted together.
 
-    It begins where it lacks least: at the screening's values for the candidates, at its values for all parameters, or, where
-    the motion tells, at values fitted along it.
+    Attributes:
+        model: at the best values known.
+        lacks: sum of squares that it leaves there [F^2].
+    """
+
+    model: Model
+    lacks: float
+
+
+def begun(track: Track, fit: Fit, tried: Sequence[Tried], scales: Scales, along: Along) -> Beginning:
+    """The fitted model with the candidates where it lacks least.
+
+    At the screening's values for the candidates, at its values for all parameters, or, where the motion tells, at values fitted
+    along it.
     """
     grown = fit.model.with_terms((*fit.model.terms, *(_start(each) for each in tried)))
-    names, bounds = free_names(grown), bounds_of(grown, scales)
     starts = [grown, _moved(grown, fit, tried[0])]
-    along = along or Along(track)
     if along.can(grown):
-        starts.append(along.fitted(grown, names, track.scale(grown, names), bounds))
-    best = min(starts, key=lambda model: float(np.sum(track.residual(model) ** 2)))
-    return track.fit(best, names, max_iterations, bounds)
+        names = free_names(grown)
+        starts.append(along.fitted(grown, names, track.scale(grown, names), bounds_of(grown, scales)))
+    lacks = [float(np.sum(track.residual(model) ** 2)) for model in starts]
+    best = int(np.argmin(lacks))
+    return Beginning(starts[best], lacks[best])
 
 
 def _moved(grown: Model, fit: Fit, tried: Tried) -> Model:

@@ -138,7 +138,7 @@ def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None])
             continue
         surprise = clear[0].gain / state.floor * track.independent
         if best is None or surprise > best[0]:
-            best = surprise, track, state, replace(found, tried=clear, laws=(), foremost=())
+            best = surprise, track, state, replace(found, tried=clear, laws=())
     if best is None:
         return None
     _, track, state, found = best

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 from ..effect import Effect
 from ..model import Model, ModelError
+from ..threads import mapped
 from .along import Along
 from .candidates import Scales
-from .fitting import State, bounds_of, fitted_with, is_driven, unseen
+from .fitting import Beginning, State, begun, bounds_of, free_names, is_driven, unseen
 from .screen import Screening, Tried
 from .track import Fit, Track
 
@@ -34,8 +35,9 @@ _LEAST_SHARE = 0.1  # of the mass behind a spring: half of it counts as much as 
 _PAIRS_FITTED = 2
 _PAIR_BETTER = 0.5  # of what the best single effect leaves, for a pair to be tried
 PER_PARAMETER = 0.012  # of what is missing
-_OTHER_LAWS = 2  # of the most promising effects are fitted in another law, too
-_FITTED = 4  # candidates that are fitted in full at each step
+_FIRST_ORDER = 2  # candidates that are fitted in full because they are the best at first order,
+_FITTED = 4  # and at most because they lack least where their fit begins,
+_LAWS = 3  # of them laws of one effect
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
 _OF_EXCESS = 0.12  # and of what is missing: less is no explanation
 BY_CHANCE = 6.0  # and times what candidates take off twins
@@ -81,30 +83,53 @@ class Rival:
 
 def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> list[Rival]:
     """The most promising candidates, and pairs where these promise far more, fitted in full; the best first."""
-    offers: list[tuple[Tried, ...]] = [(each,) for each in found.tried[:_FITTED] if each.gain > 0.0]
-    # First order fails where a contact sticks in the model and slides in the machine; the force along the motion doesn't.
-    offers += [(each,) for each in found.foremost if (each,) not in offers]
-    # First order is no judge between the laws of one effect, whose differences are of the second.
-    foremost = {each.column.term.effect.id for each in found.tried[:_OTHER_LAWS]}
-    offers += [(each,) for each in found.laws if each.column.term.effect.id in foremost]
+    along = Along(track)
+    begins = _begun(track, state.fit, [(each,) for each in (*found.tried, *found.laws)], scales, along)
+    lacks = float(state.fit.residual @ state.fit.residual)
+    offers: list[tuple[Tried, ...]] = [(each,) for each in found.tried[:_FIRST_ORDER] if each.gain > 0.0]
+    # First order fails where a contact sticks in the model and slides in the machine, and where friction has to leave first
+    # for something else to come; and it is no judge between the laws of one effect.
+    laws: dict[str, int] = {}
+    for offer in sorted(begins, key=lambda one: begins[one].lacks * (found.unpaid if _slips(one) else 1.0)):
+        effect = offer[0].column.term.effect
+        if offer in offers or begins[offer].lacks > lacks:
+            continue
+        laws[effect.id] = laws.get(effect.id, 0) + 1
+        if laws[effect.id] <= _LAWS and sum(laws.values()) <= _FITTED:
+            offers.append(offer)
     if found.tried and found.pairs:
         single = max(found.tried[0].left - state.floor, 0.05 * state.excess)
-        offers += [
+        pairs: list[tuple[Tried, ...]] = [
             (one, other) for one, other, left in found.pairs[:_PAIRS_FITTED] if left - state.floor < _PAIR_BETTER * single
         ]
+        begins |= _begun(track, state.fit, pairs, scales, along)
+        offers += pairs
     fitted: list[Rival] = []
-    along = Along(track)
     for offer in offers:
-        try:
-            fit = fitted_with(track, state.fit, offer, scales, 4, along)
-        except ModelError:
-            continue
-        fitted.append(_rival(track, state, offer, fit, found))
+        if offer in begins:
+            model = begins[offer].model
+            fit = track.fit(model, free_names(model), 4, bounds_of(model, scales))
+            fitted.append(_rival(track, state, offer, fit, found))
     fitted = _side_by_side(track, fitted, found.unpaid)
     for k, rival in enumerate(fitted[:2]):
         fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds_of(rival.fit.model, scales))
         fitted[k] = _rival(track, state, rival.offer, fit, found)
     return _side_by_side(track, fitted, found.unpaid)
+
+
+def _begun(
+    track: Track, fit: Fit, offers: Sequence[tuple[Tried, ...]], scales: Scales, along: Along
+) -> dict[tuple[Tried, ...], Beginning]:
+    """Where the fits of ``offers`` begin, but of those that make no model."""
+
+    def one(offer: tuple[Tried, ...]) -> Beginning | None:
+        try:
+            return begun(track, fit, offer, scales, along)
+        except ModelError:
+            return None
+
+    found = mapped(one, offers)
+    return {offer: beginning for offer, beginning in zip(offers, found, strict=True) if beginning is not None}
 
 
 def _side_by_side(track: Track, fitted: Sequence[Rival], unpaid: float) -> list[Rival]:

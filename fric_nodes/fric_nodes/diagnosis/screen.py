@@ -33,7 +33,6 @@ _VISIBLE = 1e-12  # of what is missing, the least that a trial changes
 _OWN = 0.02  # of a column, what the fit's own parameters must not be able to do
 _PAIRS = 5
 _AT_ONCE = 400  # sets of columns whose equations are solved together
-_FOREMOST = 2  # effects that are kept for what they promise along the motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +153,6 @@ class Promise:
             columns = along.changes(fit.model, fit.names, fit.scale)[self._rows]
             self._basis, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
             self._missing = self._base - self._basis @ (self._basis.T @ self._base)
-        self.share: dict[str, float] = {}
-        """Of what is missing along the motion, what the best trial of an effect takes, by the effect's key."""
 
     def narrowed(self, candidate: Candidate) -> list[Term]:
         """The trials of ``candidate`` that promise most."""
@@ -163,7 +160,6 @@ class Promise:
         if not self._able or effect.neutral is None or effect.command is not None:
             return list(candidate.trials)
         promise = [self._of(trial) for trial in candidate.trials]
-        self.share[effect.key] = max(promise, default=0.0) / max(float(self._missing @ self._missing), 1e-300)
         order = np.argsort(promise)[::-1][:_KEPT]
         return [candidate.trials[k] for k in order if promise[k] > 0.0]
 
@@ -233,9 +229,8 @@ class Screening:
     Attributes:
         alone: sum of squares that the refit leaves on unseen blocks [F^2].
         tried: the best trial of each effect, the best effect first.
-        laws: of effects with several laws, the best trial of another law than the one in ``tried``.
+        laws: of effects with several laws, the best trial of each law but the one in ``tried``.
         pairs: the best pairs of different effects with what they leave together, the best first.
-        foremost: of ``tried``, what takes most along the measured motion, the best first.
         unpaid: by which what effects with slip dynamics leave is multiplied, see :meth:`Track.unpaid`.
     """
 
@@ -244,7 +239,6 @@ class Screening:
     laws: tuple[Tried, ...]
     pairs: tuple[tuple[Tried, Tried, float], ...]
     unpaid: float = 1.0
-    foremost: tuple[Tried, ...] = ()
 
 
 def screen(
@@ -296,10 +290,9 @@ def screen(
         effect = tried.column.term.effect
         name = effect.id if effect.neutral is not None else effect.key
         if best.setdefault(name, tried).column.term.effect is not effect:
-            laws.setdefault(name, tried)
+            laws.setdefault(effect.key, tried)
     ranked, others = (tuple(sorted(each.values(), key=lambda one: one.left)) for each in (best, laws))
-    foremost = sorted(ranked, key=lambda each: -quick.share.get(each.column.term.effect.key, 0.0))[:_FOREMOST]
-    return Screening(alone, ranked, others, _pairs(gram, refit, able, unpaid) if in_pairs else (), unpaid, tuple(foremost))
+    return Screening(alone, ranked, others, _pairs(gram, refit, able, unpaid) if in_pairs else (), unpaid)
 
 
 def _pairs(

@@ -256,9 +256,11 @@ class Track:
     def _applied(self, model: Model) -> list[Array]:
         """What comes out of the command path of ``model`` [F], per run; that of the last model is kept."""
         path = tuple((held.effect.key, held.values) for held in model.terms if held.effect.command is not None)
-        if self._paths.get("path") != path:
-            self._paths.update(path=path, given=[respond(model, run.effort, run.sample_time) for run in self.runs])
-        return self._paths["given"]  # type: ignore[no-any-return]
+        last = self._paths.get("last")  # taken and put back as one: several threads ask at once
+        if last is None or last[0] != path:
+            last = path, [respond(model, run.effort, run.sample_time) for run in self.runs]
+            self._paths["last"] = last
+        return list(last[1])
 
     @cached_property
     def _paths(self) -> dict[str, Any]:

@@ -73,12 +73,16 @@ def common_effects() -> tuple[Effect, ...]:
 
 @lru_cache(maxsize=1)
 def worth_trying() -> tuple[Effect, ...]:
-    """One law of each effect, or all where no law is the usual one; a law that can be absent beside a usual one that can't."""
+    """One law of each effect, or all where no law is the usual one; a law that can be absent beside a usual one that can't.
+
+    Not those that come near another.
+    """
     usual = {effect.id: effect for effect in EFFECTS.values() if effect.usual}
     return tuple(
         effect
         for effect in EFFECTS.values()
-        if effect.usual or effect.id not in usual or (effect.neutral is not None and usual[effect.id].neutral is None)
+        if not effect.near
+        and (effect.usual or effect.id not in usual or (effect.neutral is not None and usual[effect.id].neutral is None))
     )
 
 

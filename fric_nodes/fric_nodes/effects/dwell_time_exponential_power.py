@@ -54,4 +54,5 @@ EFFECT = Effect(
     rate=_rate,
     regime=REGIME,
     looks_like=LOOKS_LIKE,
+    near="exponential",
 )
