@@ -193,10 +193,11 @@ def respond(model: Model, effort: Array, sample_time: float) -> Array:
     """
     if not model.has_command_path:
         return effort
+    # Friction needs neither its structure compiled nor its steps here: a contact may be a thousand times faster than a drive.
+    path = model.with_terms([held for held in model.terms if held.effect.command is not None])
     applied = np.empty(effort.shape[0])
-    _, memory = model.inner_states()
-    n_substeps = substeps(model, sample_time)
-    model.loops.respond(model.values, np.ascontiguousarray(effort), sample_time, n_substeps, memory, applied)
+    _, memory = path.inner_states()
+    path.loops.respond(path.values, np.ascontiguousarray(effort), sample_time, substeps(path, sample_time), memory, applied)
     return applied
 
 

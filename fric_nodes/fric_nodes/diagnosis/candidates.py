@@ -229,7 +229,7 @@ def _lengths(parameter: Parameter, scales: Scales) -> Array:
             return np.array([parameter.default]) if not scales.low <= 0.0 <= scales.high else np.array([0.0])
         return np.linspace(scales.low, scales.high, 13)[1:-1]
     if parameter.name == "gap":
-        return np.geomspace(max(3.0 * scales.grain, 1e-5 * scales.travel), 0.03 * scales.travel, 6)
+        return np.geomspace(max(3.0 * scales.grain, 1e-5 * scales.travel), 0.03 * scales.travel, 10)
     if parameter.name == "length":
         return np.geomspace(max(10.0 * scales.grain, 1e-4 * scales.travel), 0.03 * scales.travel, 5)  # contacts creep little
     return scales.travel * np.geomspace(0.01, 0.2, 3)

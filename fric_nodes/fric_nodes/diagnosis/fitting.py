@@ -11,18 +11,23 @@ import numpy as np
 from ..model import Model, Term
 from ..plants import PLANTS
 from ..record import Array
+from ..threads import mapped
 from .along import Along
 from .candidates import Scales, scales_of
 from .screen import Gram, Tried, blocks_of, restraint
 from .track import Bounds, Fit, Track
 from .twin import twins
 
-__all__ = ["Beginning", "State", "begun", "best_track", "bounds_of", "free_names", "is_driven", "refit", "unseen"]
+__all__ = ["Beginning", "State", "begun", "best_track", "bounds_of", "free_names", "is_driven", "refit", "shaken", "unseen"]
 
 _TWINS = 3
 _CLEAR = 25.0  # times the floor
 _INFLATION = 2.0
 _LIGHTEST = 0.3  # of the mass that a fit began with
+_SHAKES = (0.3, 0.1, 0.03, 0.3, 0.1, 0.03)  # by which values are moved, as shares of themselves
+_DRAWN = 8  # places each time
+_AFTER_A_SHAKE = 3  # iterations
+_WELL_KNOWN = 0.3
 _LOWEST_LIMIT = 0.3  # of the largest recorded force
 _MOST_FORCE = 2.0  # of the largest recorded force, a term's
 
@@ -106,6 +111,39 @@ def begun(track: Track, fit: Fit, tried: Sequence[Tried], scales: Scales, along:
     lacks = [float(np.sum(track.residual(model) ** 2)) for model in starts]
     best = int(np.argmin(lacks))
     return Beginning(starts[best], lacks[best])
+
+
+def shaken(track: Track, fit: Fit, bounds: Bounds, floor: float) -> Fit:
+    """``fit``, begun again from places around it while that helps and more than ``floor`` [F^2] is left.
+
+    What sticks, or stands in a gap, at one turn more than the machine does is a step in what is left: between such steps a
+    descent ends long before the values are found.
+    """
+    random = np.random.default_rng(1)
+    names = fit.model.names
+    index = [names.index(name) for name in fit.names]
+    low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+    for p, k in zip(fit.model.parameters(), range(len(names)), strict=True):
+        low[k], high[k] = bounds.get(p.name, (p.declaration.lower, p.declaration.upper))
+        if p.declaration.positive:
+            low[k] = max(low[k], 1e-3 * abs(float(fit.model.values[k])))
+    # What a recording tells well anyway must not be drawn far: it would drown what the others do.
+    spread = np.array([_WELL_KNOWN if "." not in name else 1.0 for name in fit.names])
+    best, left = fit, float(fit.residual @ fit.residual)
+    for width in _SHAKES:
+        if left < floor:
+            break
+        drawn = []
+        for each in random.standard_normal((_DRAWN, len(index))):
+            values = best.model.values
+            values[index] *= np.exp(width * spread * each)
+            drawn.append(best.model.with_values(np.clip(values, low, high)))
+        lacks = mapped(lambda model: float(np.sum(track.residual(model) ** 2)), drawn)
+        again = track.fit(drawn[int(np.argmin(lacks))], fit.names, _AFTER_A_SHAKE, bounds)
+        now = float(again.residual @ again.residual)
+        if now < left:
+            best, left = again, now
+    return best
 
 
 def _moved(grown: Model, fit: Fit, tried: Tried) -> Model:

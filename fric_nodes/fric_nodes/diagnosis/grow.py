@@ -16,7 +16,7 @@ from .candidates import candidates, scales_of
 from .fitting import State, best_track, refit
 from .rivals import BY_CHANCE, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
 from .screen import Screening, Tried, screen
-from .settle import Settled, Step, exchanged, merged, settled
+from .settle import FLOOR_KNOWN, Settled, Step, exchanged, merged, settled
 from .track import Track
 
 __all__ = ["Growth", "grow"]
@@ -230,7 +230,8 @@ def _added(tracks: Sequence[Track], growth: Growth, first: Rival | None, tell: C
         track, state = best_track(tracks, best.fit.model, max_iterations=6)
         state, steps = merged(track, begin, state, steps)
         scales = scales_of(track)
-        if state.excess < _LITTLE * refit(track, begin.fit.model, max_iterations=4).excess:
+        little = max(_LITTLE * refit(track, begin.fit.model, max_iterations=4).excess, FLOOR_KNOWN * state.floor)
+        if state.excess < little:
             last = screen(track, state.fit, candidates(state.fit.model, scales), state.chance, in_pairs=False).tried
             break
     return replace(growth, track=track, end=state, steps=tuple(steps), last=last, beginnings=beginnings)

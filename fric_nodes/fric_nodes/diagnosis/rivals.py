@@ -11,7 +11,7 @@ from ..model import Model, ModelError
 from ..threads import mapped
 from .along import Along
 from .candidates import Scales
-from .fitting import Beginning, State, begun, bounds_of, free_names, is_driven, unseen
+from .fitting import Beginning, State, begun, bounds_of, free_names, is_driven, shaken, unseen
 from .screen import Screening, Tried
 from .track import Fit, Track
 
@@ -38,6 +38,7 @@ PER_PARAMETER = 0.012  # of what is missing
 _FIRST_ORDER = 2  # candidates that are fitted in full because they are the best at first order,
 _FITTED = 4  # and at most because they lack least where their fit begins,
 _LAWS = 3  # of them laws of one effect
+_ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
 _OF_EXCESS = 0.12  # and of what is missing: less is no explanation
 BY_CHANCE = 6.0  # and times what candidates take off twins
@@ -112,7 +113,12 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> l
             fitted.append(_rival(track, state, offer, fit, found))
     fitted = _side_by_side(track, fitted, found.unpaid)
     for k, rival in enumerate(fitted[:2]):
-        fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds_of(rival.fit.model, scales))
+        bounds = bounds_of(rival.fit.model, scales)
+        fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds)
+        if unseen(track, fit, fit.residual) - state.floor > max(_ROUGH * state.excess, OF_FLOOR * state.floor) and _steps(
+            rival
+        ):
+            fit = shaken(track, fit, bounds, (1.0 + OF_FLOOR) * state.floor)
         fitted[k] = _rival(track, state, rival.offer, fit, found)
     return _side_by_side(track, fitted, found.unpaid)
 
@@ -152,6 +158,12 @@ def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, found
     names = [name_of(fit.model, effect) for effect in effects]
     halfway = min((each.left for each in offer), default=left)
     return Rival(effects[0], left, fit, left, dear, offer, tuple(names), max(halfway, left), found.tried)
+
+
+def _steps(rival: Rival) -> bool:
+    """True where sticking, gaps or limits make steps in what is left."""
+    effects = [each.column.term.effect for each in rival.offer]
+    return is_driven(rival.fit.model) or any(not p.linear for effect in effects for p in effect.parameters if not p.shape)
 
 
 def _slips(offer: Sequence[Tried]) -> bool:
