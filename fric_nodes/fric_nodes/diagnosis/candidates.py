@@ -28,7 +28,7 @@ from .universe import worth_trying
 __all__ = ["Candidate", "Scales", "candidates", "scales_of"]
 
 _SMALL = 0.1  # of the friction level, the size of a linear effect in a trial
-_PERIODS = 48
+_MOST_PERIODS = 24.0
 
 
 @dataclass(frozen=True)
@@ -222,8 +222,8 @@ def _of_dimension(effect: Effect, parameter: Parameter, scales: Scales) -> Array
 
 def _lengths(parameter: Parameter, scales: Scales) -> Array:
     if parameter.name == "period":
-        # Evenly spaced in cycles over the travel, as near as two can be told apart.
-        return np.asarray(scales.travel / np.linspace(0.5, 0.5 * _PERIODS, _PERIODS))
+        # Evenly spaced in cycles over the travel, as near as two can be told apart; one that isn't seen to repeat is a spring.
+        return np.asarray(scales.travel / np.arange(1.0, _MOST_PERIODS, 0.5))
     if not parameter.positive and parameter.lower < 0.0:
         if parameter.default is not None:
             return np.array([parameter.default]) if not scales.low <= 0.0 <= scales.high else np.array([0.0])

@@ -200,7 +200,9 @@ def bounds_of(model: Model, scales: Scales) -> Bounds:
             strength = p.name in held.effect.amplitudes or held.effect.play is not None
             places = p.dimension == "x" and not p.positive
             around = ranges if strength or places else ranges | scale_of
-            if p.dimension in around:
+            if p.name == "period":
+                found[f"{prefix}.{p.name}"] = (min(2.0 * scales.grain, value), max(scales.travel, value))
+            elif p.dimension in around:
                 low, high = around[p.dimension]
                 found[f"{prefix}.{p.name}"] = (min(low, value), max(high, value))
     for held_by_plant in model.parameters():

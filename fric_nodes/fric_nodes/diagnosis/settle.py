@@ -169,7 +169,7 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance, in_pairs=False)
         rivals = [rival for rival in rivals_of(track, without, found, scales) if rival.effect.id != effect_id]
         own = state.left + _price(track, state.fit.model, step.term, without.excess)
-        if rivals and own - rivals[0].score > max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
+        if rivals and own - rivals[0].score > max(OF_FLOOR * state.floor, _TO_STAY * without.excess):
             state = refit(track, rivals[0].fit.model, max_iterations=6)
             term, rivals = rivals[0].names[0], rivals[1:]
         else:

@@ -56,6 +56,7 @@ def clash(first: Concealed, second: Concealed) -> bool:
         or second.needs & first.lacks
         or (first.effect == "coulomb" and second.group in _ON_COULOMB)
         or (second.effect == "coulomb" and first.group in _ON_COULOMB)
+        or {first.effect, second.effect} == {"bias", "stiffness"}  # which are one spring with another neutral position
     )
 
 
