@@ -84,43 +84,49 @@ class Rival:
 
 def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> list[Rival]:
     """The most promising candidates, and pairs where these promise far more, fitted in full; the best first."""
+    fitted: list[Rival] = []
+    for offer, beginning in _offered(track, state, found, scales).items():
+        model = beginning.model
+        fit = track.fit(model, free_names(model), 4, bounds_of(model, scales))
+        fitted.append(_rival(track, state, offer, fit, found))
+    fitted = _side_by_side(track, fitted, found.unpaid)
+    much = state.floor + max(_ROUGH * state.excess, OF_FLOOR * state.floor)
+    for k, rival in enumerate(fitted[:2]):
+        bounds = bounds_of(rival.fit.model, scales)
+        fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds)
+        if _steps(rival) and unseen(track, fit, fit.residual) > much:
+            fit = shaken(track, fit, bounds, (1.0 + OF_FLOOR) * state.floor)
+        fitted[k] = _rival(track, state, rival.offer, fit, found)
+    return _side_by_side(track, fitted, found.unpaid)
+
+
+def _offered(track: Track, state: State, found: Screening, scales: Scales) -> dict[tuple[Tried, ...], Beginning]:
+    """What is fitted in full, and from where: the best at first order, and what lacks least where its fit begins.
+
+    First order fails where a contact sticks in the model and slides in the machine, and where friction has to leave first for
+    something else to come; and it is no judge between the laws of one effect.
+    """
     along = Along(track)
     begins = _begun(track, state.fit, [(each,) for each in (*found.tried, *found.laws)], scales, along)
     lacks = float(state.fit.residual @ state.fit.residual)
     offers: list[tuple[Tried, ...]] = [(each,) for each in found.tried[:_FIRST_ORDER] if each.gain > 0.0]
-    # First order fails where a contact sticks in the model and slides in the machine, and where friction has to leave first
-    # for something else to come; and it is no judge between the laws of one effect.
     laws: dict[str, int] = {}
     for offer in sorted(begins, key=lambda one: begins[one].lacks * (found.unpaid if _slips(one) else 1.0)):
-        effect = offer[0].column.term.effect
         if offer in offers or begins[offer].lacks > lacks:
             continue
+        effect = offer[0].column.term.effect
         laws[effect.id] = laws.get(effect.id, 0) + 1
         if laws[effect.id] <= _LAWS and sum(laws.values()) <= _FITTED:
             offers.append(offer)
     if found.tried and found.pairs:
         single = max(found.tried[0].left - state.floor, 0.05 * state.excess)
+        foremost = found.pairs[:_PAIRS_FITTED]
         pairs: list[tuple[Tried, ...]] = [
-            (one, other) for one, other, left in found.pairs[:_PAIRS_FITTED] if left - state.floor < _PAIR_BETTER * single
+            (one, other) for one, other, left in foremost if left - state.floor < _PAIR_BETTER * single
         ]
         begins |= _begun(track, state.fit, pairs, scales, along)
         offers += pairs
-    fitted: list[Rival] = []
-    for offer in offers:
-        if offer in begins:
-            model = begins[offer].model
-            fit = track.fit(model, free_names(model), 4, bounds_of(model, scales))
-            fitted.append(_rival(track, state, offer, fit, found))
-    fitted = _side_by_side(track, fitted, found.unpaid)
-    for k, rival in enumerate(fitted[:2]):
-        bounds = bounds_of(rival.fit.model, scales)
-        fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds)
-        if unseen(track, fit, fit.residual) - state.floor > max(_ROUGH * state.excess, OF_FLOOR * state.floor) and _steps(
-            rival
-        ):
-            fit = shaken(track, fit, bounds, (1.0 + OF_FLOOR) * state.floor)
-        fitted[k] = _rival(track, state, rival.offer, fit, found)
-    return _side_by_side(track, fitted, found.unpaid)
+    return {offer: begins[offer] for offer in offers if offer in begins}
 
 
 def _begun(
