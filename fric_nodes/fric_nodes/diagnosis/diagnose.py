@@ -52,6 +52,7 @@ _FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is mis
 _MANY = 3  # effects at once that still leave something are more likely to have stood in for one
 _SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, something unknown remains however little is known of the floor
+_AS_LIKELY = 0.5  # to be right as to be wrong
 _FIRST_FIT = 6  # iterations, by which starts are compared
 _STANDS_OUT = 10.0  # times the floor
 _LOCATING = 300.0  # [rad/s], for spans of time
@@ -216,13 +217,15 @@ def _concluded(
     likely, stand_in = None, False
     # What needs a mass twice or half as large as the given one is no explanation.
     far_off = min(mass_off(mass, end) for mass in (track.mass, nominal.total_inertia)) > FAR_OFF
-    if missing and (rest > _SIGNED or not findings or far_off or growth.beyond > 0.0):
+    # What is more likely wrong than right is no explanation either.
+    doubtful = all(each.confidence < _AS_LIKELY for each in findings)
+    if missing and (rest > _SIGNED or doubtful or far_off or growth.beyond > 0.0):
         likely, of_all = _signature_of(tracks, growth, rest)
         # Where one signature explains more than several effects do together, these have only stood in for it.
         stand_in = of_all and len(findings) > 1
     most = _UNEXPLAINED if len(findings) < _MANY else _SIGNED
     unsure = _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300)
-    unknown = missing and (rest > min(most + unsure, _HARDLY) or not findings or stand_in or far_off or growth.beyond > 0.0)
+    unknown = missing and (rest > min(most + unsure, _HARDLY) or doubtful or stand_in or far_off or growth.beyond > 0.0)
     unexplained = Unexplained(max(rest, growth.beyond), None)
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
         where = _where_left(held, left["augmented"], floor, scales, end)
