@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -35,6 +37,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "alone: measures time, or runs in it: no other test at the same time")
     for name, kind in _KINDS.items():
         config.addinivalue_line("markers", f"{name}: {kind.about}")
 
@@ -64,6 +67,20 @@ def pytest_testnodedown(node: Any) -> None:
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     for name, count in config.stash.get(_LEFT_OUT, {}).items():
         terminalreporter.write_line(f"{count} tests left out ({_KINDS[name].about}): to run them, {_KINDS[name].how}")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Where several processes test at once, those tests that need the machine for themselves wait for all others to stop."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return (yield)
+    # Who waits to be alone holds the gate meanwhile, or the others would never all have stopped.
+    gate, room = (Path(tempfile.gettempdir()) / f"fric-test-{name}-{os.getuid()}.lock" for name in ("gate", "room"))
+    with gate.open("w") as waiting, room.open("w") as running:
+        fcntl.flock(waiting, fcntl.LOCK_EX)
+        fcntl.flock(running, fcntl.LOCK_EX if item.get_closest_marker("alone") else fcntl.LOCK_SH)
+        fcntl.flock(waiting, fcntl.LOCK_UN)
+        return (yield)
 
 
 @pytest.fixture

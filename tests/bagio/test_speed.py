@@ -10,6 +10,8 @@ import pytest
 from fric_nodes.bagio import BagWriter, read_record
 from fric_nodes.bagio.encode import float64_messages, joint_state_messages, stamped_force_messages
 
+pytestmark = pytest.mark.alone
+
 N = 60_000
 AS_FAST = 1.4  # of the time that handing the messages to the writer takes; decoded one by one they would take about 2
 

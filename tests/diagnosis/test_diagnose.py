@@ -56,7 +56,7 @@ def test_what_other_effects_stand_in_for_is_named_alone(effect: str, seed: int) 
     case = draw(seed, "moderate", effect)
     found = diagnose(case.train, case.validation, case.nominal)
     assert [finding.effect for finding in found.findings] == [effect]
-    assert found.validation.noe_augmented < 1.1 * found.validation.noise_floor
+    assert found.validation.noe_augmented < 0.1 * found.validation.noe_refit
 
 
 def test_concealed_bristles_are_named_and_located(presliding: tuple[object, Diagnosis]) -> None:

@@ -32,6 +32,7 @@ def test_the_truth_comes_back_without_the_bias_of_filters(slider: Any, horizon: 
         assert found.train.position_rmse < 2e-4 * np.ptp(slider.position)
 
 
+@pytest.mark.alone
 def test_six_parameters_on_25000_samples_take_about_a_second(slider: Any) -> None:
     record = slider.record(noise=0.05, resolution=1e-6)
     model = structure(term("stribeck", force=0.5, velocity=0.05))

@@ -33,6 +33,8 @@ from fric_interfaces.msg import Reference, StampedForce
 if TYPE_CHECKING:
     from .conftest import Graph
 
+pytestmark = pytest.mark.alone
+
 H = 0.002
 SAMPLES = 600
 FEWER = 200  # for executors that are slow with four nodes

@@ -23,6 +23,8 @@ from sensor_msgs.msg import JointState
 
 from fric_interfaces.msg import Mismatch
 
+pytestmark = pytest.mark.alone
+
 H = 0.002
 COMPILING = 400.0  # [s] in a fresh cache, on a busy machine
 

@@ -31,6 +31,8 @@ from fric_interfaces.msg import Reference
 if TYPE_CHECKING:
     from .conftest import Graph
 
+pytestmark = pytest.mark.alone
+
 H = 0.01  # slow enough for any executor, with everything in one process, on a busy machine
 DEEP = QoSProfile(depth=20_000)
 MODEL = build_model("rigid", {"mass": 2.0}, [term("coulomb", force=5.0), term("viscous", coefficient=20.0)])

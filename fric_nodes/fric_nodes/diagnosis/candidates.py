@@ -25,7 +25,7 @@ from ..record import Array
 from .track import Track, smooth
 from .universe import worth_trying
 
-__all__ = ["Candidate", "Scales", "candidates", "scales_of"]
+__all__ = ["Candidate", "Scales", "candidates", "fewest_cycles", "scales_of"]
 
 _SMALL = 0.1  # of the friction level, the size of a linear effect in a trial
 _MOST_PERIODS = 24.0
@@ -216,14 +216,22 @@ def _of_dimension(effect: Effect, parameter: Parameter, scales: Scales) -> Array
     if dimension == "F/x^3":
         return np.asarray([scales.level / (0.01 * scales.travel) ** 3])
     if dimension == "x":
-        return _lengths(parameter, scales)
+        return _lengths(effect, parameter, scales)
     return np.array([1.0])
 
 
-def _lengths(parameter: Parameter, scales: Scales) -> Array:
+def fewest_cycles(effect: Effect) -> float:
+    """Cycles over the travel from which on something periodic is what it is called.
+
+    Friction may rise along the travel and no more; a force that isn't seen to repeat is a spring.
+    """
+    return 0.5 if effect.level is not None else 1.0
+
+
+def _lengths(effect: Effect, parameter: Parameter, scales: Scales) -> Array:
     if parameter.name == "period":
-        # Evenly spaced in cycles over the travel, as near as two can be told apart; one that isn't seen to repeat is a spring.
-        return np.asarray(scales.travel / np.arange(1.0, _MOST_PERIODS, 0.5))
+        # Evenly spaced in cycles over the travel, as near as two can be told apart.
+        return np.asarray(scales.travel / np.arange(fewest_cycles(effect), _MOST_PERIODS, 0.5))
     if not parameter.positive and parameter.lower < 0.0:
         if parameter.default is not None:
             return np.array([parameter.default]) if not scales.low <= 0.0 <= scales.high else np.array([0.0])

@@ -13,7 +13,7 @@ from ..plants import PLANTS
 from ..record import Array
 from ..threads import mapped
 from .along import Along
-from .candidates import Scales, scales_of
+from .candidates import Scales, fewest_cycles, scales_of
 from .screen import Gram, Tried, blocks_of, restraint
 from .track import Bounds, Fit, Track
 from .twin import twins
@@ -201,7 +201,10 @@ def bounds_of(model: Model, scales: Scales) -> Bounds:
             places = p.dimension == "x" and not p.positive
             around = ranges if strength or places else ranges | scale_of
             if p.name == "period":
-                found[f"{prefix}.{p.name}"] = (min(2.0 * scales.grain, value), max(scales.travel, value))
+                found[f"{prefix}.{p.name}"] = (
+                    min(2.0 * scales.grain, value),
+                    max(scales.travel / fewest_cycles(held.effect), value),
+                )
             elif p.dimension in around:
                 low, high = around[p.dimension]
                 found[f"{prefix}.{p.name}"] = (min(low, value), max(high, value))

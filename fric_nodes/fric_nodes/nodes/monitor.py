@@ -202,7 +202,8 @@ class MonitorNode(OrderlyNode):
         return (self.newest - self._origin) * 1e-9 - self.watch.changed
 
     def _look(self) -> None:
-        if self._pool is None or not self.prepared():
+        pool = self._pool
+        if pool is None or not self.prepared():
             return
         record = self.watch.since_change()
         if record is None:
@@ -210,10 +211,13 @@ class MonitorNode(OrderlyNode):
         self._looks = [each for each in self._looks if each > self._age()]
         clearest, floor = self.watch.clearest_floor()
         try:
-            self._pending = self._pool.submit(_suspects, self._text, record, clearest, floor), self.newest
+            self._pending = pool.submit(_suspects, self._text, record, clearest, floor), self.newest
         except BrokenProcessPool:
             self.counters["process that names components ended"] += 1
             self._pool = None
+        except RuntimeError:
+            if self._pool is not None:  # or else it was shut down meanwhile, with the node
+                raise
 
     def _collect(self) -> None:
         """Publish what the other process found, when it has."""
@@ -283,11 +287,11 @@ class MonitorNode(OrderlyNode):
 
     def release(self) -> None:
         """End the process that names components."""
-        if self._pool is not None:
-            for process in list((self._pool._processes or {}).values()):
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            for process in list((pool._processes or {}).values()):
                 process.kill()
-            self._pool.shutdown(wait=True, cancel_futures=True)
-            self._pool = None
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 def main(args: list[str] | None = None) -> None:
