@@ -38,6 +38,7 @@ PER_PARAMETER = 0.012  # of what is missing
 _FIRST_ORDER = 2  # candidates that are fitted in full because they are the best at first order,
 _FITTED = 4  # and at most because they lack least where their fit begins,
 _LAWS = 3  # of them laws of one effect
+_REFINED = 2  # the best, with more iterations
 _ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
 _OF_EXCESS = 0.12  # and of what is missing: less is no explanation
@@ -91,7 +92,7 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> l
         fitted.append(_rival(track, state, offer, fit, found))
     fitted = _side_by_side(track, fitted, found.unpaid)
     much = state.floor + max(_ROUGH * state.excess, OF_FLOOR * state.floor)
-    for k, rival in enumerate(fitted[:2]):
+    for k, rival in enumerate(fitted[:_REFINED]):
         bounds = bounds_of(rival.fit.model, scales)
         fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds)
         if _steps(rival) and unseen(track, fit, fit.residual) > much:
