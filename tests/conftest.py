@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import faulthandler
 import fcntl
 import os
 import tempfile
-from collections.abc import Callable, Generator
+import threading
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TextIO
 
 import pytest
 
+_ENDLESS = 900.0  # [s], longer than any test may take
+_STDERR = pytest.StashKey[TextIO]()
 _LEFT_OUT = pytest.StashKey[dict[str, int]]()
 
 
@@ -37,6 +42,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    config.stash[_STDERR] = os.fdopen(os.dup(2), "w")  # while it isn't captured yet
     config.addinivalue_line("markers", "alone: measures time, or runs in it: no other test at the same time")
     for name, kind in _KINDS.items():
         config.addinivalue_line("markers", f"{name}: {kind.about}")
@@ -52,6 +58,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             items[:] = [item for item in items if not item.get_closest_marker(name)]
             count[name] = len(left_out)
     config.stash[_LEFT_OUT] = count
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    config.stash[_STDERR].close()
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
@@ -73,14 +83,38 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     """Where several processes test at once, those tests that need the machine for themselves wait for all others to stop."""
     if "PYTEST_XDIST_WORKER" not in os.environ:
-        return (yield)
+        with _no_hang(item):
+            return (yield)
     # Who waits to be alone holds the gate meanwhile, or the others would never all have stopped.
     gate, room = (Path(tempfile.gettempdir()) / f"fric-test-{name}-{os.getuid()}.lock" for name in ("gate", "room"))
     with gate.open("w") as waiting, room.open("w") as running:
         fcntl.flock(waiting, fcntl.LOCK_EX)
         fcntl.flock(running, fcntl.LOCK_EX if item.get_closest_marker("alone") else fcntl.LOCK_SH)
         fcntl.flock(waiting, fcntl.LOCK_UN)
-        return (yield)
+        with _no_hang(item):
+            return (yield)
+
+
+@contextlib.contextmanager
+def _no_hang(item: pytest.Item) -> Iterator[None]:
+    """End the process, and say where it stood, when a test's own time limit was not able to end it.
+
+    A signal does not reach what waits in compiled code, and after a test has failed nothing limits what tidies up behind it.
+    """
+
+    def end() -> None:
+        stream = item.config.stash[_STDERR]
+        print(f"\n{item.nodeid} does not end:", file=stream, flush=True)
+        faulthandler.dump_traceback(stream)
+        os._exit(1)
+
+    guard = threading.Timer(_ENDLESS, end)
+    guard.daemon = True
+    guard.start()
+    try:
+        yield
+    finally:
+        guard.cancel()
 
 
 @pytest.fixture

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import subprocess
+import sys
+import time
 from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -53,3 +58,36 @@ def test_a_process_among_others_uses_one_thread() -> None:
         assert pool.submit(np.linalg.norm, np.ones(3)).result() == pytest.approx(np.sqrt(3.0))
         assert pool.submit(n_threads).result() == 1
         assert set(of_linear_algebra(pool.submit(threadpool_info).result())) == {1}
+
+
+_PARENT = """
+import multiprocessing, os, sys, time
+from concurrent.futures import ProcessPoolExecutor
+from fric_nodes.threads import alone
+
+if __name__ == "__main__":
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn"), initializer=alone) as pool:
+        print(pool.submit(os.getpid).result(), flush=True)
+        time.sleep(600.0)
+"""
+
+
+def test_processes_of_a_pool_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(_PARENT)
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        child = int(parent.stdout.readline())
+        parent.send_signal(signal.SIGKILL)
+        deadline = time.monotonic() + 20.0
+        while _runs(child) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not _runs(child)
+
+
+def _runs(pid: int) -> bool:
+    """True while a process runs: one that has ended may wait for whoever inherits it to take notice."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

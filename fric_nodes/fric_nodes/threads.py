@@ -7,16 +7,18 @@ the linear algebra between them is small, and threads of its own would only take
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import connection, parent_process
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
 from .errors import InputError
 
-__all__ = ["alone", "linear_algebra_in_one", "mapped", "n_threads"]
+__all__ = ["alone", "end_with_parent", "linear_algebra_in_one", "mapped", "n_threads"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -57,6 +59,23 @@ def alone() -> None:
     for name in (_NAME, *_OF_LIBRARIES):
         os.environ[name] = "1"  # for libraries that are loaded later
     threadpool_limits(1)  # for those that are there
+    end_with_parent()
+
+
+def end_with_parent() -> None:
+    """Make this process end when the one that started it does, however that was.
+
+    A process of a pool waits for work for ever, also from a parent that was killed.
+    """
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def wait() -> None:
+        connection.wait([parent.sentinel])
+        os._exit(1)  # nobody is left who could want a result
+
+    threading.Thread(target=wait, name="end with parent", daemon=True).start()
 
 
 @contextmanager

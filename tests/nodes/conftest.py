@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import os
 import random
+import signal
 import subprocess
 import sys
 import tempfile
@@ -75,8 +76,8 @@ class Graph:
         self._executors.append((executor, thread))
 
     def start(self, *args: str, **options: Any) -> subprocess.Popen[str]:
-        """``python ARGS`` as a process in this domain; its output is text, both streams piped."""
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        """``python ARGS`` as a process in this domain, and in a group of its own; its output is text, both streams piped."""
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
         process = subprocess.Popen([sys.executable, *args], env=self.environment, cwd=self.folder, **{**pipes, **options})
         self._processes.append(process)
         return process
@@ -107,9 +108,10 @@ class Graph:
         """End everything, in an order in which nothing is used after it is gone."""
         self._closing = True
         for process in self._processes:
-            if process.poll() is None:
-                process.kill()
-            process.communicate()
+            # What a process has started holds its streams open, too.
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.communicate(timeout=LIMIT)
         for executor, thread in self._executors:
             executor.shutdown(timeout_sec=5.0)
             thread.join(timeout=10.0)

@@ -19,6 +19,7 @@ from ..diagnosis import diagnose
 from ..model import Model, Term, build_model, term
 from ..record import Record
 from ..simulate import simulate
+from ..threads import end_with_parent
 from .benchmark import Benchmark, Figure
 
 __all__ = ["BENCHMARK"]
@@ -73,7 +74,7 @@ def run() -> list[Figure]:
     """Time and memory after compilation, and what was found."""
     figures = []
     for duration, limit in ((60.0, 30), (600.0, 180)):
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        with ProcessPoolExecutor(1, get_context("spawn"), initializer=end_with_parent) as pool:
             found = pool.submit(_diagnosed, duration).result()
         name = f"{duration:g} s at 1 kHz"
         figures += [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ __all__ = ["Beginning", "State", "begun", "best_track", "bounds_of", "free_names
 
 _TWINS = 3
 _CLEAR = 25.0  # times the floor
+_ASTRAY = 4.0  # times the floor of a simpler model
 _INFLATION = 2.0
 _LIGHTEST = 0.3  # of the mass that a fit began with
 _SHAKES = (0.3, 0.1, 0.03, 0.3, 0.1, 0.03)  # by which values are moved, as shares of themselves
@@ -217,13 +218,24 @@ def bounds_of(model: Model, scales: Scales) -> Bounds:
     return found
 
 
-def best_track(tracks: Sequence[Track], model: Model, max_iterations: int = 12) -> tuple[Track, State]:
-    """The fastest observer to which what ``model`` lacks stands out clearly, or the one to which it does most."""
+def best_track(
+    tracks: Sequence[Track], model: Model, max_iterations: int = 12, floors: Mapping[float, float] | None = None
+) -> tuple[Track, State]:
+    """The fastest observer to which what ``model`` lacks stands out clearly, or the one to which it does most.
+
+    Args:
+        tracks: the same recordings, followed at several bandwidths.
+        model: with values that a fit can start from.
+        max_iterations: of each fit.
+        floors: of a simpler model, of bandwidths [F^2]. A slow observer lets a model go its own way: where its twins, which
+            differ by noise alone, stick and slip far apart, it can't judge the model.
+    """
     best: tuple[float, Track, State] | None = None
     for track in sorted(tracks, key=lambda each: -each.bandwidth):
         state = refit(track, model, max_iterations=max_iterations)
         quality = state.excess / max(state.floor, 1e-300)
-        if best is None or quality > best[0]:
+        astray = floors is not None and state.floor > _ASTRAY * floors[track.bandwidth]
+        if best is None or (quality > best[0] and not astray):
             best = (quality, track, state)
         if quality > _CLEAR:
             return track, state

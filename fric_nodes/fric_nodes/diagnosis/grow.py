@@ -21,9 +21,9 @@ from .track import Track
 
 __all__ = ["Growth", "grow"]
 
-_AGAIN = 0.05  # of what is missing: with more left, other beginnings are tried
-_BEGINNINGS = 1  # of them
-_MANY = 3  # terms
+_TO_COMPARE = 2  # terms, after which another beginning is tried
+_AGAIN = 0.05  # where nothing more helps and more is left of what is missing,
+_AGAIN_FOR_MORE = 0.01  # or more than that, and more terms would come
 _MOST_TERMS = 4
 _LITTLE = 0.004  # of what is missing at the start: laws that differ in form only leave as much
 _FAINTLY = 3.0  # floors: no more is missing where a faint term is looked for
@@ -47,6 +47,7 @@ class Growth:
         rest: share of what is missing that the grown model lacks too, where it was not fitted.
         rejected: terms that came and went, with the reason.
         beginnings: what the first term was chosen from, the best first.
+        ended: False where more terms may help.
         beyond: share of what is missing to a faster observer that nothing explains; 0 where the fastest that sees it was kept.
     """
 
@@ -58,13 +59,19 @@ class Growth:
     rest: float
     rejected: tuple[tuple[str, str], ...] = field(default=())
     beginnings: tuple[Rival, ...] = field(default=())
+    ended: bool = False
     beyond: float = 0.0
 
     @property
     def price(self) -> float:
         """What is left, and a price for each parameter, by which grown models are compared."""
+        return self.rest + self.dear
+
+    @property
+    def dear(self) -> float:
+        """The price of its parameters, and of what is implausible about it."""
         n = sum(not p.shape for held in self.end.fit.model.terms for p in held.effect.parameters)
-        return self.rest + PER_PARAMETER * n + implausible(self.track.mass, self.end.fit.model)
+        return PER_PARAMETER * n + implausible(self.track.mass, self.end.fit.model)
 
 
 def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None] | None = None) -> Growth:
@@ -91,36 +98,35 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
 
 
 def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth:
-    """The best of the models grown from several beginnings."""
-    start = best_track(tracks, nominal)
-    best = _grown(tracks, start, None, tell)
+    """The best of the models grown from two beginnings."""
+    track, state = best_track(tracks, nominal)
+    start = Growth(track, state, state, (), (), 1.0)
+    best = _grown(tracks, _begun(tracks, start, tell), tell)
     if not best.steps or (best.rest > _HARDLY and best.begin.excess < _FAINTLY * best.begin.floor):
         faint = _faint(tracks, nominal, tell)
         if faint is not None and faint.steps and (not best.steps or faint.rest < best.rest):
             best = faint
-        if not best.steps:
-            return best
-    if _done(best):
-        return best
-    tried = {best.steps[0].term.split("#")[0]}
-    for first in best.beginnings:
-        if len(tried) > _BEGINNINGS:
-            break
-        if first.effect.id in tried:
-            continue
-        tried.add(first.effect.id)
-        tell(f"once more, from {' and '.join(first.names)}")
-        other = _grown(tracks, start, first, tell, exchange=False)
-        if other.steps and other.price < best.price:
-            best = _exchanged(other)
-        if _done(best):
-            break
     return best
 
 
-def _done(growth: Growth) -> bool:
-    """True when little is left by few terms, or hardly anything: many have often come to mend a wrong first one."""
-    return growth.rest < (_AGAIN if len(growth.steps) < _MANY else _LITTLE)
+def _begun(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None]) -> Growth:
+    """``start`` and its first terms: from what explains most alone, or from the next best, if that comes further.
+
+    What does the work of two effects at once explains more than either, and stays in the way of both.
+    """
+    first = _added(tracks, start, None, tell, most=_TO_COMPARE)
+    other = next((each for each in first.beginnings if each.effect.id != first.steps[0].term.split("#")[0]), None)
+    if other is None or _lacks(first) < (_AGAIN if first.ended else _AGAIN_FOR_MORE):
+        return first
+    tell(f"once more, from {' and '.join(other.names)}")
+    second = _added(tracks, start, other, tell, most=_TO_COMPARE)
+    return min(first, second, key=lambda each: _lacks(each) + each.dear)
+
+
+def _lacks(growth: Growth) -> float:
+    """Share of what is missing, on unseen blocks at first order, that the grown model lacks too."""
+    begin = refit(growth.track, growth.begin.fit.model, max_iterations=4)
+    return growth.end.excess / max(begin.excess, 1e-300)
 
 
 def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth | None:
@@ -149,7 +155,7 @@ def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None])
     others = [state.left - rival.left for rival in rivals if rival.effect.id != rivals[0].effect.id]
     if max(others, default=0.0) > _ALIKE * (state.left - rivals[0].left):
         return None
-    return _grown([track], (track, state), rivals[0], tell)
+    return _grown([track], _added([track], Growth(track, state, state, (), (), 1.0), rivals[0], tell, most=1), tell)
 
 
 def _chance_of(track: Track, state: State, tried: Sequence[Tried]) -> float:
@@ -164,24 +170,17 @@ def _exchanged(growth: Growth) -> Growth:
     return replace(growth, begin=done.begin, end=done.state, steps=done.steps, rest=done.rest, rejected=done.gone)
 
 
-def _grown(
-    tracks: Sequence[Track],
-    start: tuple[Track, State],
-    first: Rival | None,
-    tell: Callable[[str], None],
-    exchange: bool = True,
-) -> Growth:
-    """The model grown from ``start``, with ``first`` as its first step where it is given.
+def _grown(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None]) -> Growth:
+    """``start``, grown on and settled.
 
     Where terms have gone that only mended what others lacked, there is room again for what is still missing, if it is much.
     """
-    track, begin = start
-    raw = _added(tracks, Growth(track, begin, begin, (), (), 1.0), first, tell)
-    growth = _settled(raw, exchange)
+    raw = start if start.ended else _added(tracks, start, None, tell)
+    growth = _settled(raw)
     if 0 < len(growth.steps) < len(raw.steps) and growth.end.excess > _LITTLE * growth.begin.excess:
         raw = _added(tracks, growth, None, tell)
         if len(raw.steps) > len(growth.steps):
-            more = _settled(raw, exchange)
+            more = _settled(raw)
             # What comes to the same terms has earned its place among them; other terms have to be better altogether.
             if {step.term for step in growth.steps} <= {step.term for step in more.steps}:
                 better = more.rest < growth.rest
@@ -191,27 +190,33 @@ def _grown(
     return growth
 
 
-def _settled(growth: Growth, exchange: bool) -> Growth:
+def _settled(growth: Growth) -> Growth:
     """``growth`` after each of its terms had to earn its place again."""
     done = settled(growth.track, growth.begin, growth.end, list(growth.steps))
     gone = (*growth.rejected, *done.gone)
     held = replace(growth, begin=done.begin, end=done.state, steps=done.steps, rest=done.rest, rejected=gone)
-    return _exchanged(held) if exchange else held
+    return _exchanged(held)
 
 
-def _added(tracks: Sequence[Track], growth: Growth, first: Rival | None, tell: Callable[[str], None]) -> Growth:
-    """``growth`` and the terms that come to it while they help; what it leaves on unseen halves is not known yet."""
+def _added(
+    tracks: Sequence[Track], growth: Growth, first: Rival | None, tell: Callable[[str], None], most: int = _MOST_TERMS
+) -> Growth:
+    """``growth`` and the terms that come to it while they help, ``first`` before others, or until they are ``most``.
+
+    What it leaves on unseen halves is not known yet.
+    """
     track, begin, state = growth.track, growth.begin, growth.end
     scales = scales_of(track)
     steps, last, beginnings = list(growth.steps), growth.last, growth.beginnings
-    while True:
+    floors = {each.bandwidth: refit(each, begin.fit.model, max_iterations=4).floor for each in tracks}
+    ended = True
+    while first is not None or len(steps) < most:
         if first is not None:
             rivals, last, first = [first], first.screened, None
         else:
-            full = len(steps) >= _MOST_TERMS
-            found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance, in_pairs=not full)
+            found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
             last = found.tried
-            if full or (state.excess < _SAME * state.floor and not worth(state, found.tried)):
+            if state.excess < _SAME * state.floor and not worth(state, found.tried):
                 break
             rivals = [rival for rival in rivals_of(track, state, found, scales) if earns(state, rival.left, rival.offer)]
             if not rivals:
@@ -227,11 +232,19 @@ def _added(tracks: Sequence[Track], growth: Growth, first: Rival | None, tell: C
             steps.append(Step(name, before, after, state.floor, state.excess, tuple(rivals[1:]), last))
             before = after
         # What is left may show best to another observer.
-        track, state = best_track(tracks, best.fit.model, max_iterations=6)
+        track, state = best_track(tracks, best.fit.model, 6, floors)
         state, steps = merged(track, begin, state, steps)
         scales = scales_of(track)
         little = max(_LITTLE * refit(track, begin.fit.model, max_iterations=4).excess, FLOOR_KNOWN * state.floor)
         if state.excess < little:
-            last = screen(track, state.fit, candidates(state.fit.model, scales), state.chance, in_pairs=False).tried
+            last = _screened(track, state)
             break
-    return replace(growth, track=track, end=state, steps=tuple(steps), last=last, beginnings=beginnings)
+    else:
+        ended = most == _MOST_TERMS
+        last = _screened(track, state) if ended else last
+    return replace(growth, track=track, end=state, steps=tuple(steps), last=last, beginnings=beginnings, ended=ended)
+
+
+def _screened(track: Track, state: State) -> tuple[Tried, ...]:
+    """All candidates beside the fitted model, the best first."""
+    return screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False).tried

@@ -83,26 +83,36 @@ class Rival:
         return self.fair + self.dear
 
 
-def rivals_of(track: Track, state: State, found: Screening, scales: Scales) -> list[Rival]:
-    """The most promising candidates, and pairs where these promise far more, fitted in full; the best first."""
+def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_beat: float = math.inf) -> list[Rival]:
+    """The most promising candidates, and pairs where these promise far more, fitted in full; the best first.
+
+    Args:
+        track: of the recordings.
+        state: what they come to.
+        found: the screening beside it.
+        scales: of the recordings.
+        to_beat: what something else leaves in their place [F^2]: where that is hardly anything, nobody looks far.
+    """
     fitted: list[Rival] = []
-    for offer, beginning in _offered(track, state, found, scales).items():
+    much = state.floor + max(_ROUGH * state.excess, OF_FLOOR * state.floor)
+    for offer, beginning in _offered(track, state, found, scales, to_beat > much).items():
         model = beginning.model
         fit = track.fit(model, free_names(model), 4, bounds_of(model, scales))
         fitted.append(_rival(track, state, offer, fit, found))
     fitted = _side_by_side(track, fitted, found.unpaid)
-    much = state.floor + max(_ROUGH * state.excess, OF_FLOOR * state.floor)
     for k, rival in enumerate(fitted[:_REFINED]):
         bounds = bounds_of(rival.fit.model, scales)
         fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds)
-        if _steps(rival) and unseen(track, fit, fit.residual) > much:
+        if to_beat > much and _steps(rival) and unseen(track, fit, fit.residual) > much:
             fit = shaken(track, fit, bounds, (1.0 + OF_FLOOR) * state.floor)
         fitted[k] = _rival(track, state, rival.offer, fit, found)
     return _side_by_side(track, fitted, found.unpaid)
 
 
-def _offered(track: Track, state: State, found: Screening, scales: Scales) -> dict[tuple[Tried, ...], Beginning]:
+def _offered(track: Track, state: State, found: Screening, scales: Scales, far: bool) -> dict[tuple[Tried, ...], Beginning]:
     """What is fitted in full, and from where: the best at first order, and what lacks least where its fit begins.
+
+    Less is where nobody looks ``far``.
 
     First order fails where a contact sticks in the model and slides in the machine, and where friction has to leave first for
     something else to come; and it is no judge between the laws of one effect.
@@ -117,7 +127,7 @@ def _offered(track: Track, state: State, found: Screening, scales: Scales) -> di
             continue
         effect = offer[0].column.term.effect
         laws[effect.id] = laws.get(effect.id, 0) + 1
-        if laws[effect.id] <= _LAWS and sum(laws.values()) <= _FITTED:
+        if laws[effect.id] <= (_LAWS if far else 1) and sum(laws.values()) <= (_FITTED if far else _FITTED // 2):
             offers.append(offer)
     if found.tried and found.pairs:
         single = max(found.tried[0].left - state.floor, 0.05 * state.excess)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -167,7 +168,7 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
             continue
         without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
         found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance, in_pairs=False)
-        rivals = [rival for rival in rivals_of(track, without, found, scales) if rival.effect.id != effect_id]
+        rivals = [rival for rival in rivals_of(track, without, found, scales, state.left) if rival.effect.id != effect_id]
         own = state.left + _price(track, state.fit.model, step.term, without.excess)
         if rivals and own - rivals[0].score > max(OF_FLOOR * state.floor, _TO_STAY * without.excess):
             state = refit(track, rivals[0].fit.model, max_iterations=6)
@@ -190,21 +191,27 @@ def _is_nothing(held: Term) -> bool:
 
 
 def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step], list[tuple[str, str]]]:
-    """Each term taken away again, everything else fitted anew; it goes when hardly anything is lost."""
+    """Terms taken away again, everything else fitted anew, while hardly anything is lost: first the one that is missed least.
+
+    Of two that do the same work either could go, but not both.
+    """
     gone: list[tuple[str, str]] = []
-    for step in list(steps):
-        if len(steps) < 2:
+    while len(steps) > 1:
+        left_out: list[tuple[float, State, Step, str]] = []
+        for step in steps:
+            effect_id = step.term.split("#")[0]
+            terms = [held for held in state.fit.model.terms if held.effect.id != effect_id]
+            if len(terms) != len(state.fit.model.terms) - 1:
+                continue
+            without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
+            nothing = _is_nothing(next(each for each in state.fit.model.terms if each.effect.id == effect_id))
+            lost = without.left - state.left
+            if nothing or lost < max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
+                why = "comes out at nothing" if nothing else "not needed any more"
+                left_out.append((-math.inf if nothing else lost, without, step, f"{why} beside the other terms"))
+        if not left_out:
             break
-        effect_id = step.term.split("#")[0]
-        terms = [held for held in state.fit.model.terms if held.effect.id != effect_id]
-        if len(terms) != len(state.fit.model.terms) - 1:
-            continue
-        without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
-        lost = without.left - state.left
-        nothing = _is_nothing(next(each for each in state.fit.model.terms if each.effect.id == effect_id))
-        if nothing or lost < max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
-            state = without
-            steps = [each for each in steps if each is not step]
-            why = "comes out at nothing" if nothing else "not needed any more"
-            gone.append((effect_id, f"{why} beside the other terms"))
+        _, state, least, why = min(left_out, key=lambda each: each[0])
+        steps = [each for each in steps if each is not least]
+        gone.append((least.term.split("#")[0], why))
     return state, steps, gone

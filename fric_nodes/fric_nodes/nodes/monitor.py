@@ -28,6 +28,7 @@ from ..diagnosis.watch import Phase, Watch, WatchSettings
 from ..model_file import model_from_text, model_to_text, read_model
 from ..record import Record
 from ..shared_files import config_file
+from ..threads import end_with_parent
 from .bulk import BulkSubscription
 from .convert import MessageError, joint_sample, set_stamp
 from .orderly import OrderlyNode, run
@@ -67,6 +68,7 @@ def _calm() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     os.nice(5)
+    end_with_parent()
 
 
 def _prepare(text: str) -> None:
