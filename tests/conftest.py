@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TextIO
 
 import pytest
 
-_ENDLESS = 900.0  # [s], longer than any test may take
+_BEYOND = 600.0  # [s] after a test's own time limit
 _STDERR = pytest.StashKey[TextIO]()
 _LEFT_OUT = pytest.StashKey[dict[str, int]]()
 
@@ -108,7 +108,8 @@ def _no_hang(item: pytest.Item) -> Iterator[None]:
         faulthandler.dump_traceback(stream)
         os._exit(1)
 
-    guard = threading.Timer(_ENDLESS, end)
+    own = item.get_closest_marker("timeout")
+    guard = threading.Timer(_BEYOND + float(own.args[0] if own else item.config.getini("timeout")), end)
     guard.daemon = True
     guard.start()
     try:

@@ -97,3 +97,15 @@ def test_a_diagnosis_that_is_not_there_is_said_before_anything_is_drawn(tmp_path
     with pytest.raises(InputError, match="no diagnosis is there"):
         hold(2, 1, tmp_path / "proof", entry="json:diagnose")
     assert not (tmp_path / "proof").exists()
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)  # twenty diagnoses, and what they compile
+def test_twenty_concealed_cases(tmp_path: Path) -> None:
+    held = hold(20, 20, tmp_path / "proof")
+    assert not [each.failure for each in held.outcomes if each.failure]
+    assert sum(each.right for each in held.outcomes) >= 16
+    assert not [each.number for each in held.outcomes if each.kind == "nothing" and each.mismatch]
+    for each in held.outcomes:
+        assert each.noe_augmented <= 1.001 * each.noe_refit
+        assert all(found.confidence < 0.9 for found in each.findings[:1] if not each.right)

@@ -33,14 +33,14 @@ def test_the_truth_comes_back_without_the_bias_of_filters(slider: Any, horizon: 
 
 
 @pytest.mark.alone
-def test_six_parameters_on_25000_samples_take_about_a_second(slider: Any) -> None:
+def test_six_parameters_on_25000_samples_take_about_a_second_at_most(slider: Any) -> None:
     record = slider.record(noise=0.05, resolution=1e-6)
     model = structure(term("stribeck", force=0.5, velocity=0.05))
     FIT(model, [record], Options())  # compiles, or loads what was compiled
     start = time.process_time()
     found = FIT(model, [record], Options())
-    # Of the processor, half of which another program may have: one that evaluates too often takes ten times as long.
-    assert time.process_time() - start < 6.0
+    # Of the processor, which other programs do not count in: one that evaluates too often takes several times as long.
+    assert time.process_time() - start < 3.0
     assert found.model.value("mass") == pytest.approx(2.0, rel=0.05)
 
 

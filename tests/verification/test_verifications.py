@@ -14,8 +14,17 @@ from fric_nodes.report.verification import verification_page
 from fric_nodes.verification import VERIFICATIONS
 from fric_nodes.verification.verification import Evidence, Verification
 
-_LONG = {"amthor", "asperity-dwell", "asperity-velocity", "calibration", "free-oscillation"}
-_LONG |= {"online", "passivity", "stick-slip", "transmission"}
+_LONG = {
+    "amthor",
+    "asperity-dwell",
+    "asperity-velocity",
+    "calibration",
+    "free-oscillation",
+    "online",
+    "passivity",
+    "stick-slip",
+    "transmission",
+}
 
 
 def _marks(name: str) -> list[pytest.MarkDecorator]:

@@ -231,7 +231,7 @@ def fewest_cycles(effect: Effect) -> float:
 def _lengths(effect: Effect, parameter: Parameter, scales: Scales) -> Array:
     if parameter.name == "period":
         # Evenly spaced in cycles over the travel, as near as two can be told apart.
-        return np.asarray(scales.travel / np.arange(fewest_cycles(effect), _MOST_PERIODS, 0.5))
+        return np.asarray(scales.travel / np.arange(fewest_cycles(effect), _MOST_PERIODS + 0.25, 0.5))
     if not parameter.positive and parameter.lower < 0.0:
         if parameter.default is not None:
             return np.array([parameter.default]) if not scales.low <= 0.0 <= scales.high else np.array([0.0])

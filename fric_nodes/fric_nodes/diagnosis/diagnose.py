@@ -55,7 +55,7 @@ _HARDLY = 0.6  # with more than this left, something unknown remains however lit
 _AS_LIKELY = 0.5  # to be right as to be wrong
 _FIRST_FIT = 6  # iterations, by which starts are compared
 _STANDS_OUT = 10.0  # times the floor
-_LOCATING = 300.0  # [rad/s], for spans of time
+_LOCATING = 600.0  # [rad/s], for spans of time
 
 
 class DiagnosisError(InputError):
@@ -335,7 +335,7 @@ def _finding(
     energy = []
     for run, before, after in zip(fast.runs, *change, strict=True):
         h = run.sample_time
-        energy.append(steady(moved_back(before - after, h, fast.bandwidth) ** 2, h))
+        energy.append(moved_back(before - after, h, fast.bandwidth) ** 2)  # of two models, without the noise of either
     where = locate(fast, energy, scales, end)
     excess = max(step.missing, 1e-300)
     share = min(max((step.before - step.after) / max(excess, growth.begin.excess), 0.0), 1.0)

@@ -124,7 +124,7 @@ def shaken(track: Track, fit: Fit, bounds: Bounds, floor: float) -> Fit:
     names = fit.model.names
     index = [names.index(name) for name in fit.names]
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
-    for p, k in zip(fit.model.parameters(), range(len(names)), strict=True):
+    for k, p in enumerate(fit.model.parameters()):
         low[k], high[k] = bounds.get(p.name, (p.declaration.lower, p.declaration.upper))
         if p.declaration.positive:
             low[k] = max(low[k], 1e-3 * abs(float(fit.model.values[k])))
