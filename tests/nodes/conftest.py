@@ -23,7 +23,7 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.node import Node
 
 NodeT = TypeVar("NodeT", bound=Node)
-LIMIT = 30.0  # [s] generous: a wait ends when its condition holds, and the machine may be busy
+LIMIT = 90.0  # [s] generous: a wait ends when its condition holds, and the machine may be busy
 _DOMAINS = range(1, 101)  # above that, the ports of DDS fall into those that the system gives away
 
 
@@ -76,9 +76,14 @@ class Graph:
         self._executors.append((executor, thread))
 
     def start(self, *args: str, **options: Any) -> subprocess.Popen[str]:
-        """``python ARGS`` as a process in this domain, and in a group of its own; its output is text, both streams piped."""
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
-        process = subprocess.Popen([sys.executable, *args], env=self.environment, cwd=self.folder, **{**pipes, **options})
+        """``python ARGS`` as a process in this domain; its output is text, both streams piped."""
+        return self.execute(sys.executable, *args, **options)
+
+    def execute(self, *command: str, **options: Any) -> subprocess.Popen[str]:
+        """``command`` as a process in this domain, which leads a group of its own; its output is text, both streams piped."""
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        kept = {"env": self.environment, "cwd": self.folder, "start_new_session": True}
+        process = subprocess.Popen(command, **{**pipes, **kept, **options})
         self._processes.append(process)
         return process
 

@@ -27,10 +27,7 @@ def _start(graph: Graph, name: str) -> subprocess.Popen[str]:
     # The installed executables run the installed package; from a source tree the modules stand in for them.
     under_test = Path(fric_nodes.__file__).resolve().is_relative_to(Path(sys.prefix).resolve())
     command = [str(INSTALLED / name)] if under_test else [sys.executable, "-m", f"fric_nodes.nodes.{name}"]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    process = subprocess.Popen([*command, "--ros-args", *extra], env=graph.environment, cwd=graph.folder, **pipes)
-    graph._processes.append(process)
-    return process
+    return graph.execute(*command, "--ros-args", *extra)
 
 
 def test_list_is_complete() -> None:
@@ -39,6 +36,7 @@ def test_list_is_complete() -> None:
         assert importlib.util.find_spec(f"fric_nodes.nodes.{name}"), name
 
 
+@pytest.mark.timeout(900)
 def test_each_starts_answers_and_stops_on_sigint(graph: Graph) -> None:
     # The player plays a bag and ends; it has its own tests.
     names = [name for name in NODES if name != "player"]
@@ -47,7 +45,8 @@ def test_each_starts_answers_and_stops_on_sigint(graph: Graph) -> None:
     graph.spin(node)
     for name, process in running.items():
         client = node.create_client(ListParameters, f"{name}/list_parameters")
-        graph.until(lambda c=client, p=process: c.service_is_ready() or p.poll() is not None, f"{name} is there")
+        # All compile at once what is in no cache yet.
+        graph.until(lambda c=client, p=process: c.service_is_ready() or p.poll() is not None, f"{name} is there", limit=120.0)
         assert process.poll() is None, graph.finish(process)
         future = client.call_async(ListParameters.Request())
         graph.until(future.done, f"an answer of {name}")

@@ -147,7 +147,7 @@ def test_a_signal_leaves_the_drive_without_force(graph: Graph, lock_step: bool) 
     graph.start_node("plant", **_plant(graph.folder, lock_step))
     more = {**QUICK, "more_terms": "['']", "oscillation_time": 60.0, "quiet_time": 50.0, "settle_time": 0.5}
     process = graph.start_node("experiment", lock_step=lock_step, out=str(out), wait_for_subscribers=2, **more)
-    graph.until(lambda: len(hearer.forces) > 500 and max(map(abs, hearer.forces[-50:])) > 0.1, "a force acts", 60.0)
+    graph.until(lambda: len(hearer.forces) > 500 and max(map(abs, hearer.forces[-50:])) > 0.1, "a force acts", 150.0)
     status, _, words = graph.finish(process, signal.SIGINT)
     assert status == 0, words
     assert "Traceback" not in words

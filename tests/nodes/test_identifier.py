@@ -113,7 +113,7 @@ def test_from_a_recording_as_from_the_machine(graph: Any, tmp_path: Path) -> Non
     # One estimate for every half second of the recording's own time, however fast it was played; what is lost makes it late.
     stamps = [estimate.header.stamp.sec + 1e-9 * estimate.header.stamp.nanosec for estimate in listener.estimates[:-2]]
     assert np.median(np.diff(stamps)) == pytest.approx(0.5, abs=0.01)
-    assert np.all(np.abs(np.diff(stamps) - 0.55) < 0.06)
+    assert np.all(np.diff(stamps) > 0.49)
     model = model_from_message(listener.models[-1])
     assert dict(zip(model.names, model.values, strict=True)) == pytest.approx(TRUTH, rel=0.05)
     assert set(model.standard_errors) == set(TRUTH)
