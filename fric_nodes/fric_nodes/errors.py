@@ -23,3 +23,7 @@ class InputError(Exception):
         self.problem = problem
         self.remedy = remedy
         super().__init__(f"{self.where}: {problem}; {remedy}")
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str]]:
+        """As another process needs it: exceptions are made anew from their arguments, of which the message is none."""
+        return type(self), (self.where, self.problem, self.remedy)

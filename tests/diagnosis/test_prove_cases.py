@@ -42,6 +42,12 @@ def test_a_plan_is_balanced_and_follows_from_its_seed() -> None:
     assert len({order.seed for order in orders}) == 300
 
 
+@pytest.mark.parametrize("other", ["position_dependence", "time_drift", "stribeck", "load_dependence", "presliding"])
+def test_what_changes_a_friction_that_is_concealed_itself_is_no_pair_with_it(other: str) -> None:
+    assert clash(CONCEALED["coulomb"], CONCEALED[other])
+    assert clash(CONCEALED[other], CONCEALED["coulomb"])
+
+
 @pytest.mark.parametrize("kind", ["moderate", "weak"])
 def test_strength_is_what_the_kind_says_and_the_seed_gives_the_same_case(kind: str) -> None:
     first, second = draw(5, kind, "stribeck"), draw(5, kind, "stribeck")

@@ -54,13 +54,15 @@ def clash(first: Concealed, second: Concealed) -> bool:
         or (first.group and first.group == second.group)
         or first.needs & second.lacks
         or second.needs & first.lacks
-        or (first.effect == "coulomb" and second.group in _ON_COULOMB)
-        or (second.effect == "coulomb" and first.group in _ON_COULOMB)
+        or (first.effect == "coulomb" and _on_coulomb(second))
+        or (second.effect == "coulomb" and _on_coulomb(first))
         or {first.effect, second.effect} == {"bias", "stiffness"}  # which are one spring with another neutral position
     )
 
 
-_ON_COULOMB = {"low speed", "scale", "slip"}
+def _on_coulomb(entry: Concealed) -> bool:
+    """True for what changes a Coulomb friction, and alone is nothing."""
+    return entry.group in ("low speed", "scale", "slip") or entry.effect in ("position_dependence", "time_drift")
 
 
 def _sign(random: np.random.Generator) -> float:

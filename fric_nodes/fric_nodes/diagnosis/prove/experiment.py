@@ -114,6 +114,8 @@ class Bench:
         found = integrate(physics, loop, recording.course)
         if not np.all(np.isfinite(found.command)) or np.ptp(found.seen) > 3.0 * at.travel:
             raise Unreachable("the axis escapes")
+        if np.quantile(np.abs(np.diff(found.seen)), 0.99) == 0.0:
+            raise Unreachable("the axis hardly moves")
         return found
 
     def noise(self, recording: Recording) -> Array:
