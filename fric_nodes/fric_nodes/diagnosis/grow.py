@@ -77,9 +77,9 @@ class Growth:
 def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None] | None = None) -> Growth:
     """Grow ``nominal`` until nothing is missing or nothing helps.
 
-    What explains most of two effects alone may be neither of them, and what comes after it only mends it: where a grown model
-    leaves something, it is grown again from each of the next best beginnings, and the one that leaves least counts. Where a
-    fast observer sees much that nothing explains, a slower one may still see what can be explained.
+    What explains most of two effects alone may be neither of them, and what comes after it only mends it: where the first terms
+    leave something, others are tried from the next best beginning, and those that come further are grown on. Where a fast
+    observer sees much that nothing explains, a slower one may still see what can be explained.
 
     Args:
         tracks: the same recordings, followed at several bandwidths.
@@ -101,7 +101,7 @@ def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], 
     """The best of the models grown from two beginnings."""
     track, state = best_track(tracks, nominal)
     start = Growth(track, state, state, (), (), 1.0)
-    best = _grown(tracks, _begun(tracks, start, tell), tell)
+    best = _grown(tracks, _compared(tracks, start, tell), tell)
     if not best.steps or (best.rest > _HARDLY and best.begin.excess < _FAINTLY * best.begin.floor):
         faint = _faint(tracks, nominal, tell)
         if faint is not None and faint.steps and (not best.steps or faint.rest < best.rest):
@@ -109,7 +109,7 @@ def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], 
     return best
 
 
-def _begun(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None]) -> Growth:
+def _compared(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None]) -> Growth:
     """``start`` and its first terms: from what explains most alone, or from the next best, if that comes further.
 
     What does the work of two effects at once explains more than either, and stays in the way of both.
