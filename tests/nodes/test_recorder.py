@@ -117,8 +117,10 @@ def test_stamp_order_gives_the_same_bag_twice(graph: Any, tmp_path: Path) -> Non
     for run in range(2):
         bag = tmp_path / f"bag{run}"
         process = graph.start_node("recorder", bag=bag, log_time="stamp", topics="[joint_states,reference]")
-        assert graph.finish(graph.start(TALKER, "0", "1500", "joint_states", "reference"))[0] == 0
-        assert graph.finish(process, signal.SIGINT)[0] == 0
+        assert graph.finish(graph.start(TALKER, "0", "1500", "joint_states", "reference"), limit=90.0)[0] == 0
+        status, _, error = graph.finish(process, signal.SIGINT)
+        assert status == 0
+        assert "recorded 3000 messages, 0 lost" in error
         contents.append([(raw.log_time_ns, raw.topic, raw.data) for raw in iterate_raw(bag)])
     assert len(contents[0]) == 3000
     assert contents[0] == contents[1]

@@ -146,7 +146,7 @@ class PlantNode(LoopNode):
             return False
         if not self.finished.done():
             for publisher in (self._publisher, *(signal.publisher for signal in self._signals)):
-                wait_until_sent(self, publisher, 5.0)
+                wait_until_sent(self, publisher, 15.0)
             self.finish()
         return True
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Qos
@@ -17,6 +16,7 @@ from rosgraph_msgs.msg import Clock
 from ..bagio.errors import BagError
 from ..bagio.read import bag_info, iterate_raw
 from ..errors import InputError
+from .base import wait_until_sent
 from .bulk import message_class
 from .orderly import OrderlyNode, run
 from .parameters import NodeParameter, NodeParameterError, Settings
@@ -43,7 +43,7 @@ _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 _DEPTH = 1000  # messages kept for a slow reliable subscriber
 _CLOCK_TICK = 0.01  # [s] of the recording between two messages on /clock
 _MATCHING = 0.2  # [s] the subscribers' side learns of the match somewhat later, and would miss the first messages
-_SETTLE_LIMIT = 4.0  # [s]; Fast DDS asks for acknowledgements every 3 s when nothing else is published
+_SETTLE_LIMIT = 15.0  # [s]; Fast DDS asks for what was lost every 3 s: a few rounds for a subscriber on a busy machine
 
 
 class NoSubscribersError(InputError):
@@ -181,7 +181,7 @@ class PlayerNode(OrderlyNode):
         """Wait until every reliable subscriber has acknowledged what was published, so that leaving loses nothing."""
         deadline = time.monotonic() + _SETTLE_LIMIT
         for publisher in self._publishers_of.values():
-            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+            wait_until_sent(self, publisher, max(deadline - time.monotonic(), 0.0))
 
     def _wait_for_subscribers(self, wanted: int, patience: float) -> None:
         def count() -> int:
