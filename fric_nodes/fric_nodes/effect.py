@@ -119,11 +119,14 @@ class Effect:
         prepare: as ``level``; for effects with constants.
         n_states: number of internal states of ``slip``, or a function of the values.
         initial: the states of ``slip`` at the start of a run, from the values; None: zeros.
-        n_memory: number of states in the memory.
+        n_memory: number of states in the memory; they are zero at the start of a run, but for
+        velocities: numbers of those that begin with the velocity of the body, of what is carried along by it.
         n_constants: number of constants, or a function of the values.
         uses_acceleration: True when it depends on the sign of the acceleration.
         rate: fastest rate [1/s] of the effect on a body of the given mass, from ``(mass, *values)``; sets the step. None: slow.
         absent: values of nonlinear parameters at which the effect does nothing, however the others are.
+        passes_for: parameters that another effect's parameter has held, too, where this effect was not known: name, and the
+            other's name in a model with one term of that effect.
         regime: where in a recording the effect shows.
         looks_like: other effects with a similar trace, each with the experiment that tells them apart.
         repeatable: True when a model may hold several terms of this effect.
@@ -151,10 +154,12 @@ class Effect:
     n_states: Count = 0
     initial: Callable[..., Array] | None = None
     n_memory: int = 0
+    velocities: tuple[int, ...] = ()
     n_constants: Count = 0
     uses_acceleration: bool = False
     rate: Callable[..., float] | None = None
     absent: Mapping[str, float] = field(default_factory=dict)
+    passes_for: Mapping[str, str] = field(default_factory=dict)
     regime: str = ""
     looks_like: Mapping[str, str] = field(default_factory=dict)
     repeatable: bool = False
@@ -195,6 +200,12 @@ class Effect:
         if self.initial is not None:
             return self.initial(*values)
         return np.zeros(self.n_states(*values) if callable(self.n_states) else self.n_states)
+
+    def memory(self, velocity: float) -> Array:
+        """The memory at the start of a run, in which the body moves with ``velocity`` [x/s], shape ``(n_memory,)``."""
+        begins = np.zeros(self.n_memory)
+        begins[list(self.velocities)] = velocity
+        return begins
 
     def constants(self, values: Sequence[float]) -> int:
         """Number of constants for these ``values``."""

@@ -150,10 +150,11 @@ class Model:
         """The compiled loops of this structure; the first call in a fresh cache compiles."""
         return loops_for(self.plant, [held.effect for held in self.terms])
 
-    def inner_states(self) -> tuple[Array, Array]:
-        """States of the slip dynamics and memory of all terms at the start of a run."""
+    def inner_states(self, velocity: float = 0.0) -> tuple[Array, Array]:
+        """States of the slip dynamics and memory of all terms at the start of a run, with ``velocity`` [x/s]."""
         slip = [held.effect.start(held.values) for held in self.terms if held.effect.slip is not None]
-        return slip[0] if slip else np.zeros(0), np.zeros(sum(held.effect.n_memory for held in self.terms))
+        memory = [held.effect.memory(velocity) for held in self.terms]
+        return slip[0] if slip else np.zeros(0), np.concatenate([np.zeros(0), *memory])
 
     @property
     def has_command_path(self) -> bool:

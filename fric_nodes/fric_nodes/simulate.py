@@ -86,7 +86,7 @@ class Simulator:
         self._encoder = model.plant.encoder
         plant_values = np.array(model.plant_values)
         self.states = np.ascontiguousarray(model.plant.start(plant_values, position, velocity), dtype=np.float64)
-        self.friction_state, self.memory = model.inner_states()
+        self.friction_state, self.memory = model.inner_states(velocity)
         self.applied = 0.0
         self.time = 0.0
 

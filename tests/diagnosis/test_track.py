@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.track import Track
+from fric_nodes.diagnosis.fitting import best_track
+from fric_nodes.diagnosis.track import Track, resolution
 from fric_nodes.diagnosis.twin import twins
-from fric_nodes.model import Model, build_model, term
+from fric_nodes.model import Model, Term, build_model, term
 from fric_nodes.record import Record
 from scipy.integrate import solve_ivp
 
@@ -74,3 +76,42 @@ def test_a_twin_lacks_nothing_but_noise() -> None:
     track = Track.of([recorded()], 140.0, complete)
     for twin in twins(track, complete, 2):
         assert float(np.std(track.residual(complete, twin))) < 0.02 * LACKING
+
+
+def noisy() -> Record:
+    """The same, as an encoder with noise reads it."""
+    found = recorded()
+    return replace(found, position=found.position + 2e-6 * np.random.default_rng(5).standard_normal(found.position.shape[0]))
+
+
+def test_noise_weighs_the_same_whatever_body_the_encoder_sits_on() -> None:
+    """Or a light body that carries the rest on a stiff spring would explain the noise of an encoder."""
+    whole = build_model("rigid", {"mass": MASS}, [*contact(), term("bias", force=LACKING)])
+    mode = term("compliance", "appendage", mass=0.7 * MASS, frequency=150.0, damping=0.1)
+    parted = build_model("rigid", {"mass": 0.3 * MASS}, [*contact(), term("bias", force=LACKING), mode])
+    track = Track.of([noisy()], 140.0, whole)
+    energy = [float(np.sum(track.residual(each) ** 2)) for each in (whole, parted)]
+    assert 0.7 < energy[1] / energy[0] < 1.6
+
+
+def contact() -> list[Term]:
+    """Thick oil, and bristles that are too weak to matter."""
+    bristles = term("presliding", stiffness=1e3, damping=1.0)
+    return [term("viscous", coefficient=VISCOUS), term("coulomb", force=1e-3), bristles]
+
+
+def test_where_nothing_is_missing_to_any_observer_the_one_that_has_seen_it_is_kept() -> None:
+    complete = model(force=LACKING)
+    tracks = [Track.of([noisy()], bandwidth, complete) for bandwidth in (45.0, 140.0, 400.0)]
+    for track in tracks:
+        assert best_track(tracks, complete, otherwise=track)[0] is track
+    # Where something is, the fastest that sees it clearly.
+    assert best_track(tracks, model(), otherwise=tracks[0])[0] is tracks[2]
+
+
+def test_the_step_of_an_encoder_is_found_also_where_the_axis_rests_and_hurries() -> None:
+    random = np.random.default_rng(8)
+    jumps = np.where(random.random(4000) < 0.1, random.integers(3, 90, 4000), 0)
+    jumps[2000] = 1  # once
+    assert resolution(np.cumsum(jumps) * 1e-5) == pytest.approx(1e-5, rel=1e-6)
+    assert resolution(np.cumsum(random.standard_normal(4000))) == 0.0

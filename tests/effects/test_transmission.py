@@ -292,6 +292,14 @@ def test_an_appendage_is_a_second_mass_on_a_spring() -> None:
     assert np.max(np.abs(one[:, 0] - two[:, 2])) < 1e-5 * span[2]
 
 
+def test_an_appendage_moves_along_when_a_run_begins_in_motion() -> None:
+    # Without force and friction nothing changes then: neither the body's velocity nor the distance between both.
+    plant = {"inertia": 2.0, "proportional": 0.0, "derivative": 0.0, "gravity": 0.0, "start": 0.0}
+    model = build_model("pendulum", plant, [term("compliance", "appendage", mass=0.5, frequency=6.0, damping=0.02)])
+    states, _ = Simulator(model, velocity=0.7).run(np.zeros(200), 1e-3, 4)
+    np.testing.assert_allclose(states[:, 1], 0.7, rtol=1e-12)
+
+
 def test_an_appendage_goes_on_any_plant_but_a_link_needs_two_bodies() -> None:
     plant = {"inertia": 2.0, "proportional": 0.0, "derivative": 0.0, "gravity": 0.0, "start": 0.0}
     build_model("pendulum", plant, [term("compliance", "appendage", mass=1.0, frequency=5.0)])

@@ -77,9 +77,12 @@ def resolution(position: Array) -> float:
     change = change[change > 0.0]
     if change.size < 20:
         return 0.0
-    smallest = float(np.quantile(change, 0.02))
-    counts = change / smallest
-    return smallest if float(np.mean(np.abs(counts - np.round(counts)) < 0.05)) > 0.9 else 0.0
+    # An axis that rests most of the time and hurries otherwise hardly ever moves by one step: then it is the smallest change.
+    for smallest in (float(np.quantile(change, 0.02)), float(np.min(change))):
+        counts = change / smallest
+        if float(np.mean(np.abs(counts - np.round(counts)) < 0.05)) > 0.9:
+            return smallest
+    return 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +189,7 @@ class Track:
     def residual(self, model: Model, twin: Twin | None = None) -> Array:
         """The force that ``model`` lacks [F] at the end of each interval, shape ``(n,)``; on a ``twin`` of the recordings."""
         # The impulses are those of one mass, whatever mass the model has: a light model must not be led with less force.
-        return self._followed(model, model.total_inertia if model.has_slip_dynamics else self.mass, twin)
+        return self._followed(model, self.mass, twin)
 
     def unpaid(self, model: Model) -> float:
         """By how much less energy ``model`` seems to lack when its position is set instead of pushed; at least 1.
@@ -212,7 +215,7 @@ class Track:
             state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k))
             found = np.empty(effort.shape[0])
             around = run.step, self.n_substeps(model, run), run.load, run.temperature, alpha, beta
-            last = state, *universe.inner_states(model), found
+            last = state, *universe.inner_states(model, run.start[1]), found
             if mass is None:
                 universe.loops.observe(values, effort, position, *around, self.noise[k], *last)
             else:
@@ -233,7 +236,7 @@ class Track:
             effort, friction = np.empty_like(time), np.empty_like(time)
             universe.loops.predict(
                 values, time - 0.5 * each.step, each.position, each.velocity, each.acceleration, each.step, run.load,
-                run.temperature, *universe.inner_states(model), effort, friction,
+                run.temperature, *universe.inner_states(model, float(each.velocity[0])), effort, friction,
             )  # fmt: skip
             found.append(effort - given)
         return self._finite(self.seen(found))

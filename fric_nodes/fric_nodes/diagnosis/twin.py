@@ -41,7 +41,7 @@ def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
     universe.loops.lead(
         universe.values(model), given,
         wanted[:-1].copy(), rate[:-1].copy(), run.step, track.n_substeps(model, run), run.load, run.temperature,
-        track.mass * lead**2, 2.0 * track.mass * lead, state, *universe.inner_states(model), there, extra,
+        track.mass * lead**2, 2.0 * track.mass * lead, state, *universe.inner_states(model, float(rate[0])), there, extra,
     )  # fmt: skip
     return there, extra, given
 

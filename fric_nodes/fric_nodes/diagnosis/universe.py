@@ -35,7 +35,6 @@ class Universe:
         loops: compiled.
         neutral: values at which every effect is absent and switched off, the plant's own zero, shape ``(n_values,)``.
         offset: of each effect's first value, by its key.
-        n_memory: number of states in the memory.
     """
 
     plant: Plant
@@ -43,7 +42,6 @@ class Universe:
     loops: Loops
     neutral: Array
     offset: Mapping[str, int]
-    n_memory: int
 
     def values(self, model: Model) -> Array:
         """The values of ``model`` for this structure, shape ``(n_values,)``."""
@@ -59,10 +57,11 @@ class Universe:
         values[at : at + len(term.values)] = term.values
         values[len(values) - len(self.effects) + self.effects.index(term.effect)] = 1.0
 
-    def inner_states(self, model: Model) -> tuple[Array, Array]:
-        """States of the slip dynamics and memory of all effects at the start of a run."""
+    def inner_states(self, model: Model, velocity: float = 0.0) -> tuple[Array, Array]:
+        """States of the slip dynamics and memory of all effects at the start of a run, with ``velocity`` [x/s]."""
         slip = [held.effect.start(held.values) for held in model.terms if held.effect.slip is not None]
-        return (slip[0] if slip else np.zeros(0)), np.zeros(self.n_memory)
+        memory = [effect.memory(velocity) for effect in self.effects]
+        return (slip[0] if slip else np.zeros(0)), np.concatenate([np.zeros(0), *memory])
 
 
 @lru_cache(maxsize=1)
@@ -105,5 +104,4 @@ def _universe(plant: Plant, own: tuple[str, ...]) -> Universe:
         offset[effect.key] = len(neutral)
         neutral += effect.neutral or [1.0] * len(effect.parameters)
     neutral += [0.0] * len(effects)  # the switches
-    n_memory = sum(effect.n_memory for effect in effects)
-    return Universe(plant, tuple(effects), loops_for(plant, effects, switched=True), np.array(neutral), offset, n_memory)
+    return Universe(plant, tuple(effects), loops_for(plant, effects, switched=True), np.array(neutral), offset)

@@ -97,7 +97,7 @@ class Follower:
         """Begin anew at ``position`` [x] with ``velocity`` [x/s]; no block counts until the observer has settled."""
         start = self._model.plant.start(self._plant_values, position, velocity)
         self._state = np.ascontiguousarray(start, dtype=np.float64)
-        self._inner = self._model.inner_states()
+        self._inner = self._model.inner_states(velocity)
         self.skip = self.settling
 
     def follow(self, step: Array, effort: Array, position: Array, noise: float) -> Array:

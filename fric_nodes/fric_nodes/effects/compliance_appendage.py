@@ -11,7 +11,7 @@ while the body is held. De Marchi takes damping in proportion to frequency, whic
 
 Over a step at constant velocity of the body the equation is solved exactly, and the mean force on the body is the momentum
 that the appendage takes, m_a (v_a(h) - v_a(0))/h: neither momentum nor energy is lost but in the damper. A run starts with the
-appendage at rest and undeflected.
+appendage undeflected, moving as the body does.
 Source: de Marchi 1998, summed-mode compliance, after Rayleigh 1877 and Thomson 1972.
 """
 
@@ -85,6 +85,7 @@ EFFECT = Effect(
     force=force,
     remember=remember,
     n_memory=2,
+    velocities=(1,),
     rate=_rate,
     regime="after every quick change of the force: an oscillation that rides on the motion, always at the same frequency",
     looks_like={

@@ -145,7 +145,7 @@ def innovations(model: Model, runs: Sequence[Run], index: float, n_substeps: int
         found = np.empty(run.effort.shape[0])
         loops.observe(
             values, run.effort, run.position, run.step, n_substeps, run.load, run.temperature, alpha, beta, run.noise,
-            state, *model.inner_states(), found,
+            state, *model.inner_states(run.start[1]), found,
         )  # fmt: skip
         parts.append(found[SETTLING:])
     # A model that escapes must cost much, not break the solver.

@@ -117,7 +117,7 @@ class KalmanFilter:
         theta = np.where(logs, np.log(np.where(logs, start, 1.0)), start)
         spread = np.where(logs, np.minimum(deviations / np.where(logs, start, 1.0), _LOG_LIMIT), deviations)
         states = np.ascontiguousarray(model.plant.start(np.array(model.plant_values), position, velocity), dtype=np.float64)
-        slips, memory = model.inner_states()
+        slips, memory = model.inner_states(velocity)
         self._led = slips.shape[0] > _MOST_STATES
         n_theta, n_x, n_z = theta.shape[0], states.shape[0], 0 if self._led else slips.shape[0]
         n = n_theta + n_x + n_z + 1
@@ -166,7 +166,7 @@ class KalmanFilter:
         self._ahead.clear()
         n_theta, n = self._n_theta, self.mean.shape[0]
         model = self.model()
-        slips, memory = model.inner_states()
+        slips, memory = model.inner_states(velocity)
         states = model.plant.start(np.array(model.plant_values), position, velocity)
         self.mean[n_theta:] = np.concatenate([states, slips[: self._n_z], [force]])
         self._slips[:], self._memories[:] = slips, memory
