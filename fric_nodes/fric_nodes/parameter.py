@@ -43,6 +43,7 @@ class Parameter:
         linear: True when the force is linear in it, so that least squares finds it without iteration.
         shape: True for a shape parameter (an exponent) that a fit holds at its value unless asked to free it.
         positive: True when zero itself is refused (a mass, a velocity that divides).
+        also: of a shape parameter, values besides the default that machines have, for a diagnosis to try.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Parameter:
     linear: bool = False
     positive: bool = False
     shape: bool = False
+    also: tuple[float, ...] = ()
 
     def unit(self, units: Units) -> str:
         """The parameter's unit for a joint measured in ``units``."""

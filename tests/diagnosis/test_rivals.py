@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from fric_nodes.diagnosis.candidates import candidates, scales_of
+from fric_nodes.diagnosis.fitting import refit, with_room
 from fric_nodes.diagnosis.rivals import implausible
-from fric_nodes.model import Model, build_model, term
+from fric_nodes.diagnosis.screen import screen
+from fric_nodes.diagnosis.track import Track
+from fric_nodes.model import Model, Term, build_model, term
+from fric_nodes.record import Record
+from scipy.integrate import solve_ivp
 
 
 def _axis(mass: float, share: float) -> Model:
@@ -19,3 +26,38 @@ def test_hardly_any_mass_behind_a_spring_counts_as_a_mass_that_is_off() -> None:
     assert light == pytest.approx(implausible(2.0, _axis(4.0, 0.4)))  # half of the least share, twice the mass
     assert implausible(2.0, _axis(2.0, 0.1)) == 0.0
     assert implausible(2.0, build_model("rigid", {"mass": 2.0}, [term("coulomb", force=4.0)])) == 0.0
+
+
+def test_what_has_passed_for_friction_leaves_it() -> None:
+    axis = build_model("rigid", {"mass": 2.0}, [term("coulomb", force=9.0), term("viscous", coefficient=1.0)])
+    (start,) = with_room(axis, [term("input_deadzone", width=2.5)])
+    assert (start.value("coulomb.force"), start.value("input_deadzone.width")) == (6.5, 2.5)
+    assert with_room(axis, [term("input_deadzone", width=9.5)]) == []  # more than there was
+    assert with_room(axis, [term("bias", force=2.5)]) == []
+    frictionless: list[Term] = [term("viscous", coefficient=1.0)]
+    assert with_room(build_model("rigid", {"mass": 2.0}, frictionless), [term("input_deadzone", width=1.0)]) == []
+
+
+def test_a_mode_that_holds_most_of_the_mass_is_the_best_candidate() -> None:
+    """First order sees little of it, where the trial rings long at another frequency than the machine does."""
+    body, hung, frequency, damping, viscous = 0.8, 1.2, 55.0, 0.03, 40.0
+    w, step, shift = 2.0 * np.pi * frequency, 1e-3, 0.4
+
+    def push(t: float) -> float:
+        return 30.0 * float(np.sin(2.0 * np.pi * 1.3 * t)) + (12.0 if int(t / 0.37 + shift) % 2 else -12.0)
+
+    def rates(t: float, x: np.ndarray) -> list[float]:
+        given = push(step * np.floor(t / step + 1e-9))
+        spring = hung * (w**2 * (x[2] - x[0]) + 2.0 * damping * w * (x[3] - x[1]))
+        return [x[1], (given - viscous * x[1] + spring) / body, x[3], -spring / hung]
+
+    time = np.arange(9000) * step
+    found = solve_ivp(rates, (0.0, time[-1]), np.zeros(4), t_eval=time, max_step=0.5 * step, rtol=1e-8, atol=1e-11)
+    position = found.y[0] + 1e-6 * np.random.default_rng(2).standard_normal(time.shape[0])
+    record = Record(time, position, np.array([push(float(t)) for t in time]), effort_hold="following")
+    start = build_model("rigid", {"mass": body + hung}, [term("viscous", coefficient=viscous)])
+    track = Track.of([record], 400.0, start)
+    state = refit(track, start)
+    screened = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False)
+    assert screened.tried[0].column.term.effect.key == "compliance/appendage"
+    assert screened.tried[0].gain > 0.2 * state.excess

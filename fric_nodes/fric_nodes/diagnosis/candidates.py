@@ -28,6 +28,7 @@ from .universe import worth_trying
 __all__ = ["Candidate", "Scales", "candidates", "fewest_cycles", "scales_of"]
 
 _SMALL = 0.1  # of the friction level, the size of a linear effect in a trial
+_DAMPED = 0.1  # damping ratio of a mode that fades within a few periods
 _MOST_PERIODS = 24.0
 
 
@@ -170,6 +171,9 @@ def _with_damping(effect: Effect, values: Sequence[float], scales: Scales) -> li
 def _grid(effect: Effect, parameter: Parameter, scales: Scales) -> Sequence[float]:
     if parameter.name in effect.amplitudes:
         return _amplitudes(parameter, scales)
+    if parameter.name == "damping" and parameter.dimension == "1" and parameter.default is not None:
+        # What rings long in a trial soon has another phase than the machine's; what hardly rings tells less where it fits.
+        return (parameter.default, _DAMPED)
     if parameter.shape or (parameter.default is not None and parameter.dimension not in ("x", "s")):
         assert parameter.default is not None
         return (parameter.default,)

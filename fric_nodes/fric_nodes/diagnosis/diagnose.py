@@ -213,7 +213,8 @@ def _concluded(
     seen_rest *= held.unpaid(begin) if end.has_slip_dynamics else 1.0
     rest = min(max(growth.rest, seen_rest), 1.0) if missing else 0.0
     findings = [_finding(validation, held, growth, end, step, scored, scales, rest) for step in growth.steps]
-    findings.sort(key=lambda each: -each.confidence)  # of two that are equally sure, what came first
+    # What explains most comes first, as far as it is sure to: what mends the form of another's law may be as sure.
+    findings.sort(key=lambda each: -each.confidence * each.share)
     likely, stand_in = None, False
     # What needs a mass twice or half as large as the given one is no explanation.
     far_off = min(mass_off(mass, end) for mass in (track.mass, nominal.total_inertia)) > FAR_OFF

@@ -18,8 +18,23 @@ from .screen import Gram, Tried, blocks_of, restraint
 from .track import Bounds, Fit, Track
 from .twin import twins
 
-__all__ = ["Beginning", "State", "begun", "best_track", "bounds_of", "free_names", "is_driven", "refit", "shaken", "unseen"]
+__all__ = [
+    "NOTHING",
+    "Beginning",
+    "State",
+    "begun",
+    "best_track",
+    "bounds_of",
+    "free_names",
+    "is_driven",
+    "refit",
+    "shaken",
+    "unseen",
+    "with_room",
+]
 
+NOTHING = 0.35
+"""Share of the floor: nothing is missing when less than this is left above it."""
 _TWINS = 3
 _CLEAR = 25.0  # times the floor
 _ASTRAY = 4.0  # times the floor of a simpler model
@@ -101,17 +116,33 @@ class Beginning:
 def begun(track: Track, fit: Fit, tried: Sequence[Tried], scales: Scales, along: Along) -> Beginning:
     """The fitted model with the candidates where it lacks least.
 
-    At the screening's values for the candidates, at its values for all parameters, or, where the motion tells, at values fitted
-    along it.
+    At the screening's values for the candidates, at its values for all parameters, with room made for what has passed for
+    something else, or, where the motion tells, at values fitted along it.
     """
     grown = fit.model.with_terms((*fit.model.terms, *(_start(each) for each in tried)))
-    starts = [grown, _moved(grown, fit, tried[0])]
+    starts = [grown, _moved(grown, fit, tried[0]), *with_room(fit.model, [each.column.term for each in tried])]
     if along.can(grown):
         names = free_names(grown)
         starts.append(along.fitted(grown, names, track.scale(grown, names), bounds_of(grown, scales)))
     lacks = [float(np.sum(track.residual(model) ** 2)) for model in starts]
     best = int(np.argmin(lacks))
     return Beginning(starts[best], lacks[best])
+
+
+def with_room(model: Model, terms: Sequence[Term]) -> list[Model]:
+    """``model`` with the new ``terms``, less what has passed for them; nothing, where nothing has or too little is there."""
+    taken: dict[str, float] = {}
+    for held in terms:
+        for p, value in zip(held.effect.parameters, held.values, strict=True):
+            if p.name in held.effect.passes_for:
+                taken[held.effect.passes_for[p.name]] = value
+    if not taken or any(name not in model.names or model.value(name) < value for name, value in taken.items()):
+        return []
+    whole = model.with_terms((*model.terms, *terms))
+    values = whole.values
+    for name, value in taken.items():
+        values[whole.names.index(name)] -= value
+    return [whole.with_values(values)]
 
 
 def shaken(track: Track, fit: Fit, bounds: Bounds, floor: float) -> Fit:
@@ -219,7 +250,11 @@ def bounds_of(model: Model, scales: Scales) -> Bounds:
 
 
 def best_track(
-    tracks: Sequence[Track], model: Model, max_iterations: int = 12, floors: Mapping[float, float] | None = None
+    tracks: Sequence[Track],
+    model: Model,
+    max_iterations: int = 12,
+    floors: Mapping[float, float] | None = None,
+    otherwise: Track | None = None,
 ) -> tuple[Track, State]:
     """The fastest observer to which what ``model`` lacks stands out clearly, or the one to which it does most.
 
@@ -229,8 +264,10 @@ def best_track(
         max_iterations: of each fit.
         floors: of a simpler model, of bandwidths [F^2]. A slow observer lets a model go its own way: where its twins, which
             differ by noise alone, stick and slip far apart, it can't judge the model.
+        otherwise: the one of ``tracks`` to stay with, where nothing is missing to any.
     """
     best: tuple[float, Track, State] | None = None
+    stay: State | None = None
     for track in sorted(tracks, key=lambda each: -each.bandwidth):
         state = refit(track, model, max_iterations=max_iterations)
         quality = state.excess / max(state.floor, 1e-300)
@@ -239,5 +276,9 @@ def best_track(
             best = (quality, track, state)
         if quality > _CLEAR:
             return track, state
+        if track is otherwise:
+            stay = state
     assert best is not None
+    if otherwise is not None and stay is not None and best[0] < NOTHING:
+        return otherwise, stay
     return best[1], best[2]

@@ -8,12 +8,13 @@ without it, and with each rival in its place, everything is fitted anew. It ends
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..model import Model
 from .candidates import candidates, scales_of
-from .fitting import State, best_track, refit
+from .fitting import NOTHING, State, best_track, refit
 from .rivals import BY_CHANCE, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
 from .screen import Screening, Tried, screen
 from .settle import FLOOR_KNOWN, Settled, Step, exchanged, merged, settled
@@ -30,8 +31,9 @@ _FAINTLY = 3.0  # floors: no more is missing where a faint term is looked for
 _FAINT = 0.04  # of the floor, and
 _DRAWS = 40.0  # times what one parameter takes off noise: so little may still be seen clearly
 _ALIKE = 0.8  # of what the best takes off: another that does tells that the cause can't be told
+_TIED = 0.05  # of the floor: no observer tells two that differ by less
 _HARDLY = 0.5  # of what is missing: with more left, another observer may see what it is
-_SAME = 0.35  # of the floor: nothing is missing when less than this is left above it
+_TRIED = 0.15  # of the floor: with more left above it, something is fitted in full, whatever it promises at first order
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +91,7 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
     tell = progress or (lambda _: None)
     best = _best_growth(tracks, nominal, tell)
     slower = [track for track in tracks if track.bandwidth < best.track.bandwidth]
-    if best.rest > _HARDLY and slower and (best.steps or best.end.excess > _SAME * best.end.floor):
+    if best.rest > _HARDLY and slower and (best.steps or best.end.excess > NOTHING * best.end.floor):
         tell(f"most of it stays unexplained to an observer of {best.track.bandwidth:.3g} rad/s; looking with a slower one")
         other = _best_growth(slower, nominal, tell)
         if other.steps and other.rest < _HARDLY:
@@ -216,11 +218,12 @@ def _added(
         else:
             found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
             last = found.tried
-            if state.excess < _SAME * state.floor and not worth(state, found.tried):
+            if state.excess < _TRIED * state.floor and not worth(state, found.tried):
                 break
             rivals = [rival for rival in rivals_of(track, state, found, scales) if earns(state, rival.left, rival.offer)]
             if not rivals:
                 break
+            rivals = _told_apart(tracks, track, state, rivals)
         best = rivals[0]
         beginnings = beginnings if steps else tuple(rivals[1:])
         tell(
@@ -232,7 +235,7 @@ def _added(
             steps.append(Step(name, before, after, state.floor, state.excess, tuple(rivals[1:]), last))
             before = after
         # What is left may show best to another observer.
-        track, state = best_track(tracks, best.fit.model, 6, floors)
+        track, state = best_track(tracks, best.fit.model, 6, floors, track)
         state, steps = merged(track, begin, state, steps)
         scales = scales_of(track)
         little = max(_LITTLE * refit(track, begin.fit.model, max_iterations=4).excess, FLOOR_KNOWN * state.floor)
@@ -243,6 +246,24 @@ def _added(
         ended = most == _MOST_TERMS
         last = _screened(track, state) if ended else last
     return replace(growth, track=track, end=state, steps=tuple(steps), last=last, beginnings=beginnings, ended=ended)
+
+
+def _told_apart(tracks: Sequence[Track], track: Track, state: State, rivals: Sequence[Rival]) -> list[Rival]:
+    """``rivals``, of those that leave as much as the best the one first that leaves least to faster observers.
+
+    A delay and a lag are one to a slow observer, to which what is missing may stand out most all the same.
+    """
+    tied = [
+        each
+        for each in rivals
+        if each.score - rivals[0].score < _TIED * state.floor and len(each.names) == len(rivals[0].names)
+    ]
+    faster = [each for each in tracks if each.bandwidth > track.bandwidth]
+    if not faster or len({each.effect.id for each in tied}) < 2:
+        return list(rivals)
+    left = [sum(math.log(refit(each, one.fit.model, max_iterations=4).left) for each in faster) for one in tied]
+    first = tied[left.index(min(left))]
+    return [first, *(each for each in rivals if each is not first)]
 
 
 def _screened(track: Track, state: State) -> tuple[Tried, ...]:

@@ -36,6 +36,7 @@ _PAIRS_FITTED = 2
 _PAIR_BETTER = 0.5  # of what the best single effect leaves, for a pair to be tried
 PER_PARAMETER = 0.012  # of what is missing
 _FIRST_ORDER = 2  # candidates that are fitted in full because they are the best at first order,
+_NEARLY = 0.5  # of what the best takes off: another that does is fitted, too,
 _FITTED = 4  # and at most because they lack least where their fit begins,
 _LAWS = 3  # of them laws of one effect
 _REFINED = 2  # the best, with more iterations
@@ -106,7 +107,29 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         if to_beat > much and _steps(rival) and unseen(track, fit, fit.residual) > much:
             fit = shaken(track, fit, bounds, (1.0 + OF_FLOOR) * state.floor)
         fitted[k] = _rival(track, state, rival.offer, fit, found)
-    return _side_by_side(track, fitted, found.unpaid)
+    fitted = _side_by_side(track, fitted, found.unpaid)
+    return [*(_shaped(track, state, rival, found, scales) for rival in fitted[:1]), *fitted[1:]]
+
+
+def _shaped(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> Rival:
+    """``rival`` with those shapes of its terms, among the ones that machines have, that leave least.
+
+    What a wrong shape leaves would be taken for another effect.
+    """
+    best = rival
+    for each in rival.offer:
+        effect = each.column.term.effect
+        for p in effect.parameters:
+            for value in p.also:
+                model, name = best.fit.model, f"{name_of(best.fit.model, effect)}.{p.name}"
+                values = model.values
+                values[model.names.index(name)] = value
+                model = model.with_values(values)
+                fit = track.fit(model, free_names(model), 8, bounds_of(model, scales))
+                other = _rival(track, state, rival.offer, fit, found)
+                if best.left - other.left > OF_FLOOR * state.floor:
+                    best = replace(other, fair=other.left * rival.fair / max(rival.left, 1e-300))
+    return best
 
 
 def _offered(track: Track, state: State, found: Screening, scales: Scales, far: bool) -> dict[tuple[Tried, ...], Beginning]:
@@ -120,7 +143,10 @@ def _offered(track: Track, state: State, found: Screening, scales: Scales, far: 
     along = Along(track)
     begins = _begun(track, state.fit, [(each,) for each in (*found.tried, *found.laws)], scales, along)
     lacks = float(state.fit.residual @ state.fit.residual)
-    offers: list[tuple[Tried, ...]] = [(each,) for each in found.tried[:_FIRST_ORDER] if each.gain > 0.0]
+    most = found.tried[0].gain if found.tried else 0.0
+    enough = [_NEARLY * most if most > _OF_EXCESS * state.excess else math.inf] * _FITTED
+    enough[:_FIRST_ORDER] = [0.0] * _FIRST_ORDER
+    offers: list[tuple[Tried, ...]] = [(each,) for each, least in zip(found.tried, enough, strict=False) if each.gain > least]
     laws: dict[str, int] = {}
     for offer in sorted(begins, key=lambda one: begins[one].lacks * (found.unpaid if _slips(one) else 1.0)):
         if offer in offers or begins[offer].lacks > lacks:

@@ -35,6 +35,7 @@ EFFECT = Effect(
     command=command,
     uncommand=uncommand,
     absent={"width": 0.0},
+    passes_for={"width": "coulomb.force"},
     regime="commands around zero: nothing happens, and larger ones lose a constant part",
     looks_like={
         "coulomb": "let it coast: friction stops a body that moves, a dead zone lets it roll",

@@ -53,7 +53,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("force", "F_S - F_C", "F", "surplus of static friction over Coulomb friction", lower=0.0, linear=True),
         Parameter("velocity", "v_S", "x/s", "Stribeck velocity, where the surplus has fallen to 1/e", positive=True),
-        Parameter("exponent", "delta", "1", "shape of the fall", lower=0.1, upper=10.0, default=2.0, shape=True),
+        Parameter("exponent", "delta", "1", "shape of the fall", lower=0.1, upper=10.0, default=2.0, shape=True, also=(1.0,)),
     ),
     level=level,
     rate=_rate,
