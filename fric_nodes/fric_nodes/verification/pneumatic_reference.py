@@ -14,7 +14,7 @@ about the share of the range that Table 1 gives it (2.65 %); how far the other m
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -23,7 +23,7 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 from ..record import Array
 
-__all__ = ["FRICTION", "Slip", "free_motion", "stick_slip"]
+__all__ = ["FRICTION", "Slip", "free_motion", "slips", "stick_slip"]
 
 KAPPA, R, T = 1.4, 287.0, 293.0
 AREA, STROKE, DEAD = 3.14159e-4, 0.1, 1e-6
@@ -193,3 +193,27 @@ def stick_slip(position: float, command: float, sample_time: float, rest: float)
             velocity[k] = 0.0
             force[k] = friction[k] = AREA * (pressure[0] - pressure[1])
     return Slip(time, force, (force - friction) / MASS, velocity, round(rest / sample_time))
+
+
+def slips(position: float, commands: Sequence[float], sample_time: float) -> tuple[Array, Array]:
+    """Position [m] and force of the pressures [N] at each sample of stick-slips one after the other, without noise.
+
+    Args:
+        position: where the piston sticks at first [m], both chambers at the pressure of the exhaust.
+        commands: of the valve, one for each rest and the slip that ends it.
+        sample_time: of the recording [s].
+    """
+    state = np.array([position, 0.0, EXHAUST, EXHAUST])
+    positions, forces, begun, n = [], [], 0.0, 0
+    for command in commands:
+        sticks, before = _sticking(state, command, FRICTION["F_S"])
+        slipping, moving = _slipping(np.array([state[0], 1e-9, *before(sticks), 1.0]), command)
+        while n * sample_time < begun + sticks + slipping:
+            t = n * sample_time - begun
+            x, p_a, p_b = (state[0], *before(t)) if t < sticks else moving(t - sticks)[[0, 2, 3]]
+            positions.append(x)
+            forces.append(AREA * (p_a - p_b))
+            n += 1
+        begun += sticks + slipping
+        state = np.array([moving(slipping)[0], 0.0, *moving(slipping)[2:4]])
+    return np.array(positions), np.array(forces)
