@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..model import Model
 from ..record import Array
 from .candidates import place_of
 from .screen import Tried
@@ -72,7 +73,7 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
     independent = max(track.independent, 50.0)
     held = _Motions(track.motion, [run.effort for run in track.runs], track.time)
     found: dict[str, Signature] = {}
-    for component, title, columns in _ways(track, held, missing):
+    for component, title, columns in _ways(track, held, missing, _rubbing(fit.model, held)):
         n = columns.shape[1]
         left = _left(np.concatenate([nominal, columns[::stride]], axis=1), target)
         signature = _marked(component, title, left / max(alone, 1e-300), n, independent)
@@ -101,13 +102,24 @@ def _left(columns: Array, target: Array) -> float:
     return float(np.sum((target - columns @ weight) ** 2))
 
 
-def _ways(track: Track, held: _Motions, missing: Array) -> Iterator[tuple[str, str, Array]]:
+def _rubbing(model: Model, held: _Motions) -> list[Array]:
+    """Friction that doesn't grow with speed [F], as what is left of the measured force: it knows when a contact sticks."""
+    values = {p.name: p.value for p in model.parameters()}
+    viscous, bias = values.get("viscous.coefficient", 0.0), values.get("bias.force", 0.0)
+    return [
+        u - model.total_inertia * each.acceleration - viscous * each.velocity - bias
+        for u, each in zip(held.effort, held.motion, strict=True)
+    ]
+
+
+def _ways(track: Track, held: _Motions, missing: Array, rubbing: Sequence[Array]) -> Iterator[tuple[str, str, Array]]:
     """Component, way, and its columns, shape ``(n, n_columns)`` each."""
     rate = [each.velocity for each in held.motion]
     fast = max(float(np.quantile(np.abs(np.concatenate(rate)), 0.9)), 1e-12)
     way = [np.tanh(v / (0.02 * fast)) for v in rate]
     guideway, load = "guideway friction", "load"
     yield guideway, "friction whose level changes with time", _changing(track, way, held.time)
+    yield guideway, "friction whose level changes with time", _changing(track, rubbing, held.time)
     yield guideway, "friction whose slope changes with time", _changing(track, rate, held.time)
     driven = [sign * np.abs(u) for sign, u in zip(way, held.effort, strict=True)]
     yield guideway, "friction that goes with the motor's force", _seen(track, [driven])

@@ -414,7 +414,8 @@ def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float) -> tuple
         if state.excess > _STANDS_OUT * state.floor or track.bandwidth >= growth.track.bandwidth:
             break
     whole = signatures(track, state.fit, () if growth.steps else growth.last)[0]
-    if not growth.steps or whole.share > 1.0 - rest:
+    # What hardly explains anything has no say in what is left either.
+    if not growth.steps or whole.share > 1.0 - rest or rest > _HARDLY:
         return whole, True
     return signatures(track, refit(track, growth.end.fit.model, max_iterations=_FIRST_FIT).fit, growth.last)[0], False
 

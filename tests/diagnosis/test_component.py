@@ -1,0 +1,64 @@
+"""In which component something unknown sits, on axes that a step method of the test integrates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from fric_nodes.diagnosis.component import signatures
+from fric_nodes.diagnosis.fitting import refit
+from fric_nodes.diagnosis.track import Track
+from fric_nodes.model import build_model, term
+from fric_nodes.record import Record
+
+_STEP, _FINER = 2e-3, 8
+_MASS, _LEVEL, _VISCOUS = 2.0, 5.0, 12.0
+_SWINGS = ((0.31, 0.05, 0.4), (0.83, 0.02, 2.0), (2.3, 0.004, 5.0))  # [Hz], [m], [rad]
+
+
+def _in_window(t: float) -> bool:
+    return t % 5.0 > 3.2
+
+
+def _recorded(friction: Callable[[float], float], gain: Callable[[float], float], mass: Callable[[float], float]) -> Record:
+    """An axis that a controller leads along swings; friction, gain and mass are relative to the usual, over time [s]."""
+    n, h = 10_000, _STEP / _FINER
+    position, effort = np.empty(n), np.empty(n)
+    q = v = 0.0
+    for k in range(n):
+        t = k * _STEP
+        r = sum(a * math.sin(2 * math.pi * f * t + p) - a * math.sin(p) for f, a, p in _SWINGS)
+        w = sum(a * 2 * math.pi * f * math.cos(2 * math.pi * f * t + p) for f, a, p in _SWINGS)
+        u = 3000.0 * (r - q) + 120.0 * (w - v) + 0.9 * _LEVEL * math.tanh(w / 0.01)
+        position[k], effort[k] = q, u
+        for _ in range(_FINER):
+            against = _LEVEL * friction(t) * math.tanh(v / 1e-3) + _VISCOUS * v
+            v += h / (_MASS * mass(t)) * (u * gain(t) - against)
+            q += h * v
+    random = np.random.default_rng(6)
+    noisy = effort + 0.05 * random.standard_normal(n)
+    return Record(_STEP * np.arange(n), np.round(position / 1e-7) * 1e-7, noisy, effort_hold="following")
+
+
+def _always(t: float) -> float:
+    return 1.0
+
+
+@pytest.mark.parametrize(
+    ("friction", "gain", "mass", "component"),
+    [
+        (lambda t: 1.6 if _in_window(t) else 1.0, _always, _always, "guideway friction"),
+        (_always, lambda t: 0.75 if _in_window(t) else 1.0, _always, "command path"),
+        (_always, _always, lambda t: 1.8 if t > 9.0 else 1.0, "load"),
+    ],
+)
+def test_the_component_is_told_by_the_force_that_hangs_on_it(
+    friction: Callable[[float], float], gain: Callable[[float], float], mass: Callable[[float], float], component: str
+) -> None:
+    nominal = build_model("rigid", {"mass": _MASS}, [term("coulomb", force=_LEVEL), term("viscous", coefficient=_VISCOUS)])
+    track = Track.of([_recorded(friction, gain, mass)], 45.0, nominal)
+    found = signatures(track, refit(track, nominal).fit)
+    assert found[0].component == component
+    assert found[0].share > 0.7
