@@ -21,8 +21,10 @@ __all__ = ["Message", "ReceiveOrder", "StampOrder", "TopicIntake", "header_stamp
 
 _STAMP = {0: struct.Struct(">iI"), 1: struct.Struct("<iI")}
 _REMEMBERED = 64  # payloads kept per topic to recognise a retransmission; lock-step runs ahead by far less
-_SILENT_AFTER = 1_000_000_000  # [ns] a topic that says nothing for so long, on a busy machine too, doesn't hold up others
-_HELD_AT_FIRST = 1_000_000_000  # [ns] from the first message on, for topics that have not said anything yet
+# A topic that says nothing for so long doesn't hold up others [ns]. What a busy machine has lost comes again within about 3 s,
+# which is how often Fast DDS asks for it.
+_SILENT_AFTER = 7_000_000_000
+_HELD_AT_FIRST = _SILENT_AFTER  # from the first message on [ns], for topics that have not said anything yet
 _RESTART = 1_000_000  # [ns] between the last log time and the first one after a restart of the stamps
 
 Message = tuple[int, int, bytes]
