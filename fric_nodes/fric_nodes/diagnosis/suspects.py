@@ -66,13 +66,13 @@ class Suspects:
 
 @dataclass(frozen=True, eq=False)
 class _Suspect:
-    """An effect, whether the model has it, its component, its columns, and whether their sign is free."""
+    """An effect, whether the model has it, its component, its columns, and the amplitudes that they are per unit of, if any."""
 
     effect: str
     known: bool
     component: str
     columns: tuple[Array, ...]
-    signed: bool
+    amplitudes: tuple[str, ...] | None
     n_shapes: int = 0
     left: float = math.inf
     term: Term | None = None
@@ -106,8 +106,8 @@ def suspects(model: Model, record: Record, bandwidth: float, floor: float) -> Su
     for column in columns_of(track, fit, trials):
         effect = column.term.effect
         n_shapes = len(effect.parameters) - len(column.amplitudes)
-        signed = bool(column.amplitudes)
-        found.append(_Suspect(effect.id, False, place_of(effect), column.parts, signed, n_shapes, term=column.term))
+        amplitudes = column.amplitudes or None
+        found.append(_Suspect(effect.id, False, place_of(effect), column.parts, amplitudes, n_shapes, term=column.term))
     energy = float(missing @ missing)
     ranked = _refined(track, model, _ranked(track, missing, found, 0.9 * energy))
     base = min(floor**2 * n, 0.9 * energy)
@@ -141,7 +141,7 @@ def _present(track: Track, model: Model, missing: Array) -> list[_Suspect]:
     residuals = mapped(track.residual, trials)
     columns = {name: (residual - missing) / step for name, residual, step in zip(names, residuals, steps, strict=True)}
     return [
-        _Suspect(effect, True, component, tuple(columns[name] for name in members), True)
+        _Suspect(effect, True, component, tuple(columns[name] for name in members), ())
         for effect, component, members in groups.values()
     ]
 
@@ -160,7 +160,7 @@ def _ranked(track: Track, missing: Array, found: list[_Suspect], most: float) ->
     for suspect in found:
         used = [k for k in range(at, at + len(suspect.columns)) if size[k] > 1e-6 * size[0]]
         at += len(suspect.columns)
-        if not used or (not suspect.signed and gram.solved(0, used)[0] <= 0.0):
+        if not used or (suspect.amplitudes is None and gram.solved(0, used)[0] <= 0.0):
             continue
         left = gram.left(0, used) + energy * (_PER_COLUMN * len(used) + _PER_SHAPE * suspect.n_shapes)
         key = (suspect.effect, suspect.component)
@@ -174,16 +174,30 @@ def _refined(track: Track, model: Model, ranked: list[_Suspect]) -> list[_Suspec
     near = [each for each in ranked[:_REFINED] if each.left < _NEAR * ranked[0].left]
     if len(near) < 2:
         return ranked
-    energy = float(np.sum(track.residual(model) ** 2))
+    missing = track.residual(model)
+    energy = float(missing @ missing)
     for k, each in enumerate(near):
         if each.term is None:
             continue
-        grown = model.with_terms((*model.terms, each.term))
+        grown = model.with_terms((*model.terms, _sized(each, each.term, missing)))
         names = [name for name in free_names(grown) if name not in model.names]
         fit = track.fit(grown, names, _REFINING, bounds_of(grown, scales_of(track)))
         left = float(fit.residual @ fit.residual) + energy * (_PER_COLUMN * len(each.columns) + _PER_SHAPE * each.n_shapes)
         near[k] = replace(each, left=min(left, each.left))
     return sorted([*near, *(each for each in ranked if each not in ranked[: len(near)])], key=lambda each: each.left)
+
+
+def _sized(suspect: _Suspect, held: Term, missing: Array) -> Term:
+    """The suspect's term with the amplitudes that first order asks for: few iterations don't come from a trial's to them."""
+    if not suspect.amplitudes or not all(np.all(np.isfinite(part)) for part in suspect.columns):
+        return held
+    sizes, *_ = np.linalg.lstsq(np.column_stack(suspect.columns), -missing, rcond=1e-9)
+    found = dict(zip(suspect.amplitudes, sizes.tolist(), strict=True))
+    values = [
+        min(max(found[p.name], p.lower), p.upper) if p.name in found else value
+        for p, value in zip(held.effect.parameters, held.values, strict=True)
+    ]
+    return replace(held, values=tuple(values))
 
 
 def _verdict(ranked: list[_Suspect], energy: float, base: float, regime: str, strength: float, duration: float) -> Suspects:

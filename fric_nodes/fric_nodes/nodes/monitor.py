@@ -59,8 +59,7 @@ PARAMETERS = (
 _QUEUE = 5000  # samples that may wait
 _ROUND = 0.01  # [s] between two rounds of taking samples
 _BATCH = 1000
-_LOOKS = (1.0, 2.0, 3.0, 4.5, 8.0)  # [s] after the change at which what was recorded since is looked at
-_EARLY, _SURE = 1.9, 0.8  # [s] since the change before which a component is named only with so much confidence
+_LOOKS = (2.0, 3.0, 4.5, 8.0)  # [s] after the change at which what was recorded since is looked at; a second tells too little
 
 
 def _calm() -> None:
@@ -227,15 +226,15 @@ class MonitorNode(OrderlyNode):
             return
         future, stamp = self._pending
         self._pending = None
+        if future.cancelled():
+            return  # with the process that was to do it, as the node ends
         error = future.exception()
         if error is not None:
             self.counters["failed: naming the component"] += 1
             self.get_logger().warning(f"the component could not be named: {error}", throttle_duration_sec=5.0)
         elif self.watch.phase is Phase.DETECTED:
-            found = future.result()
-            if found.duration >= _EARLY or found.component_confidence >= _SURE:
-                self._found = found
-                self._say(stamp)
+            self._found = future.result()
+            self._say(stamp)
 
     def _say(self, stamp: int) -> None:
         found, watch = self._found, self.watch
