@@ -28,7 +28,7 @@ __all__ = ["Suspects", "prepare_suspects", "suspects"]
 _STEP = 0.02  # of a parameter's value, or of what would matter, for its column
 _OFFSET, _BY_RIVAL, _BY_REST = 0.5, 2.2, -3.0  # as for findings of a diagnosis
 _MOST = 0.995
-_REFINED, _REFINING, _NEAR = 4, 5, 2.5  # suspects, iterations, and times what the best leaves
+_REFINED, _REFINING, _NEAR = 5, 10, 4.0  # suspects, iterations, and times what the best leaves
 _HARDLY = 0.6  # of the missing energy: when the best suspect leaves more, it is no explanation
 _PER_COLUMN = 0.01  # of the missing energy, the price of a suspect's column
 _PER_SHAPE = 0.015  # and of each value of it that was chosen from a grid
@@ -147,7 +147,7 @@ def _present(track: Track, model: Model, missing: Array) -> list[_Suspect]:
 
 
 def _ranked(track: Track, missing: Array, found: list[_Suspect], most: float) -> list[_Suspect]:
-    """The best of each effect and component, with what it leaves on unseen blocks; the best first."""
+    """The best of each effect in each of its forms, with what it leaves on unseen blocks; the best first."""
     columns = np.column_stack([missing, *(part for suspect in found for part in suspect.columns)])
     usable = np.all(np.isfinite(columns), axis=0)
     columns[:, ~usable] = 0.0
@@ -155,7 +155,7 @@ def _ranked(track: Track, missing: Array, found: list[_Suspect], most: float) ->
     columns[:, 1:] /= np.maximum(size[1:], 1e-300)
     gram = Gram(columns, blocks_of(track, columns.shape[0]))
     energy = float(missing @ missing)
-    best: dict[tuple[str, str], _Suspect] = {}
+    best: dict[tuple[str, str, str], _Suspect] = {}
     at = 1
     for suspect in found:
         used = [k for k in range(at, at + len(suspect.columns)) if size[k] > 1e-6 * size[0]]
@@ -163,7 +163,7 @@ def _ranked(track: Track, missing: Array, found: list[_Suspect], most: float) ->
         if not used or (suspect.amplitudes is None and gram.solved(0, used)[0] <= 0.0):
             continue
         left = gram.left(0, used) + energy * (_PER_COLUMN * len(used) + _PER_SHAPE * suspect.n_shapes)
-        key = (suspect.effect, suspect.component)
+        key = (suspect.effect, suspect.component, "" if suspect.term is None else suspect.term.effect.law)
         if left < most and (key not in best or left < best[key].left):
             best[key] = replace(suspect, left=left)
     return sorted(best.values(), key=lambda each: each.left)

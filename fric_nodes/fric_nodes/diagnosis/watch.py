@@ -34,6 +34,7 @@ BANDWIDTHS = (25.0, 140.0)
 _FAST = 1.0  # largest product of bandwidth and sample time
 _STEP_OF_RATE = 0.2
 _SETTLING = 6.0  # time constants of the observer
+_CHANGING = 10.0  # the same: when a change began is not known better
 _BLOCK = 0.1  # [s]
 _MEASURING = 1.0  # [s] from which step and noise are known before anything is followed
 _FEWEST = 200  # samples for that
@@ -338,12 +339,13 @@ class Watch:
     def since_change(self) -> Record | None:
         """The latest seconds since the change, without a gap; None when there are too few samples yet.
 
-        They begin a little earlier, by what an observer needs to settle: what came before the change says nothing about it.
+        They begin a little later: of a few hundredths of a second in which nothing had changed yet, an effect that explains all
+        the rest would seem to be wrong.
         """
         if math.isnan(self.changed) or not self._history:
             return None
         samples = np.concatenate(self._history)
-        first = max(self.changed - _SETTLING / self.clearest.bandwidth, samples[-1, 0] - _LOOKED_AT)
+        first = max(self.changed + _CHANGING / self.clearest.bandwidth, samples[-1, 0] - _LOOKED_AT)
         samples = samples[samples[:, 0] >= first]
         if samples.shape[0] < _FEWEST:
             return None
