@@ -63,6 +63,7 @@ class Plant:
         inertia: mass that the contact feels [F s^2/x] from the plant's own values, for step sizes.
         encoder: which states the sensor reports as position and velocity.
         whole: mass that a slow command moves [F s^2/x], from the plant's own values; None: as ``inertia``.
+        seen: mass of the body that the sensor sees, by itself [F s^2/x], from the plant's own values; None: as ``whole``.
         initial: the states at rest from ``(values, position, velocity)``; None: zeros, but for position and velocity.
         signals: what it measures besides.
         effort: the force on the contact, as :attr:`Signal.of`, where the command isn't a force; None: the applied command.
@@ -87,10 +88,15 @@ class Plant:
     rate: Callable[..., float] | None = None
     driven: Plant | None = None
     whole: Callable[..., float] | None = None
+    seen: Callable[..., float] | None = None
 
     def total_inertia(self, *values: float) -> float:
         """Mass that a slow command moves [F s^2/x]."""
         return (self.inertia if self.whole is None else self.whole)(*values)
+
+    def seen_inertia(self, *values: float) -> float:
+        """Mass of the body that the sensor sees, by itself [F s^2/x]."""
+        return self.total_inertia(*values) if self.seen is None else self.seen(*values)
 
     def start(self, values: Array, position: float, velocity: float) -> Array:
         """The states at the start of a run, ``(n_states,)``, with the sensor at ``position`` [x] and ``velocity`` [x/s]."""

@@ -24,6 +24,9 @@ __all__ = ["twins"]
 _SMOOTH = 4.0  # times the observer's bandwidth: of the motion that a twin is led along
 _ESCAPED = 10.0  # spans of the recorded motion, beyond which it does not matter how far a twin has run
 _LED = 4.0  # times the observer's bandwidth: of the spring that leads it; with a softer one a model sticks and slips
+# Spring and damper act once per sample: what they may be at most, times m/h^2 and m/h of the body that the sensor sees. That
+# is a part of the whole where there is play: the whole's spring would make it swing between the stops, wider each time.
+_STIFFEST, _MOST_DAMPING = 0.15, 0.6
 
 
 def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
@@ -35,13 +38,16 @@ def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
     rate = np.gradient(wanted, step)
     lead = min(_LED * track.bandwidth, 0.3 / step)
     plant_values = np.array(model.plant_values)
+    seen = min(track.mass, universe.plant.seen_inertia(*plant_values))
+    stiffness = min(track.mass * lead**2, _STIFFEST * seen / step**2)
+    damping = min(2.0 * track.mass * lead, _MOST_DAMPING * seen / step)
     state = np.append(universe.plant.start(plant_values, float(wanted[0]), float(rate[0])), track.begin(k))
     given = smooth(run.effort, step, _SMOOTH * track.bandwidth)
     there, extra = np.empty_like(given), np.empty_like(given)
     universe.loops.lead(
         universe.values(model), given,
         wanted[:-1].copy(), rate[:-1].copy(), run.step, track.n_substeps(model, run), run.load, run.temperature,
-        track.mass * lead**2, 2.0 * track.mass * lead, state, *universe.inner_states(model, float(rate[0])), there, extra,
+        stiffness, damping, state, *universe.inner_states(model, float(rate[0])), there, extra,
     )  # fmt: skip
     return there, extra, given
 

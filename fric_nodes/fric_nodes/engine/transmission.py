@@ -114,8 +114,8 @@ def elastic_step(
         excess, friction = elastic_trial(p, motor, m_l, x, x_next, s, u, f, h, around)
         if trial == 0:
             enough = 1e-9 * abs(excess)
-        if abs(excess) <= enough or (trial > 0 and abs(f - b) <= 4e-16 * abs(f)):
-            break
+        if not abs(excess) > enough or (trial > 0 and abs(f - b) <= 4e-16 * abs(f)):
+            break  # also at once where it is no number
         if trial == 1 or excess * excess_b < 0.0:
             a, excess_a = b, excess_b
         elif abs(excess) > 0.5 * abs(excess_b):

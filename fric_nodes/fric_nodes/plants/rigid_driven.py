@@ -42,6 +42,10 @@ def _whole(mass: float, load_share: float) -> float:
     return mass
 
 
+def _seen(mass: float, load_share: float) -> float:
+    return mass * (1.0 - load_share)
+
+
 def _initial(values: Array, position: float, velocity: float) -> Array:
     """Both together, in the middle of the play."""
     return np.array([position, velocity, position, velocity])
@@ -67,6 +71,7 @@ DRIVEN = Plant(
     inertia=_inertia,
     encoder=(2, 3),
     whole=_whole,
+    seen=_seen,
     initial=_initial,
     signals=(Signal("load_position", "x", "position of the load, behind the transmission", _load_position),),
 )

@@ -49,6 +49,10 @@ def _whole(motor_mass: float, load_mass: float, motor_coulomb: float, motor_visc
     return motor_mass + load_mass
 
 
+def _seen(motor_mass: float, load_mass: float, motor_coulomb: float, motor_viscous: float) -> float:
+    return motor_mass
+
+
 def _initial(values: Array, position: float, velocity: float) -> Array:
     """Both together, in the middle of the play."""
     return np.array([position, velocity, position, velocity])
@@ -81,6 +85,7 @@ _TEST_BED = Plant(
     inertia=_inertia,
     encoder=(2, 3),
     whole=_whole,
+    seen=_seen,
     initial=_initial,
     signals=(
         Signal("load_position", "x", "position of the load, behind the transmission", _load_position),
