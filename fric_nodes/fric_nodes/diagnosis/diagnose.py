@@ -228,16 +228,20 @@ def _concluded(
     unsure = _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300)
     unknown = missing and (rest > min(most + unsure, _HARDLY) or doubtful or stand_in or far_off or growth.beyond > 0.0)
     unexplained = Unexplained(max(rest, growth.beyond), None)
+    remains = None
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
-        where = _where_left(held, left["augmented"], floor, scales, end)
+        remains = _left(held, left["augmented"], floor)
+        where = locate(held, remains, scales, end)
         unexplained = replace(unexplained, where=where)
         if likely is not None and unknown:
             nobody = _unknown(where, likely, growth, scored, unexplained.share)
             # What helps is told all the same; beside something unknown one in ten of such findings was right.
             found = [replace(each, confidence=min(each.confidence, round(1.0 - nobody.confidence, 4))) for each in findings]
             findings = [nobody, *sorted(found, key=lambda each: -each.share)]
+    everything = locate(held, _whole(validation, held, growth, end, remains), scales, end) if missing else None
     return Diagnosis(
         mismatch=missing,
+        where=everything,
         checks=tuple(checks),
         nominal=_nominal_part(nominal, growth.begin.fit),
         findings=tuple(findings),
@@ -330,14 +334,9 @@ def _finding(
     place = list(end.prefixes).index(step.term)
     effect = end.terms[place].effect
     without = end.with_terms(term for k, term in enumerate(end.terms) if k != place)
-    fast = Track.of(validation, min(_LOCATING, _FAST / held.runs[0].step[0]), growth.begin.fit.model)
+    fast = _locating(validation, held, growth)
     shown = growth.begin.fit.model if len(growth.steps) == 1 else without
-    change = fast.padded(fast.residual(shown)), fast.padded(fast.residual(end))
-    energy = []
-    for run, before, after in zip(fast.runs, *change, strict=True):
-        h = run.sample_time
-        energy.append(moved_back(before - after, h, fast.bandwidth) ** 2)  # of two models, without the noise of either
-    where = locate(fast, energy, scales, end)
+    where = locate(fast, _difference(fast, shown, end), scales, end)
     excess = max(step.missing, 1e-300)
     share = min(max((step.before - step.after) / max(excess, growth.begin.excess), 0.0), 1.0)
     rival = next((each for each in step.rivals if effect.id not in {name.split("#")[0] for name in each.names}), None)
@@ -373,14 +372,31 @@ def _percent(part: float, whole: float) -> str:
     return f"{100.0 * max(part, 0.0) / whole:.3g} %"
 
 
-def _where_left(held: Track, residual: Array, floor: Sequence[Array], scales: Scales, model: Model) -> Where:
-    """Where the rest sits: its energy above what twins leave at the same speed."""
+def _locating(validation: Sequence[Record], held: Track, growth: Growth) -> Track:
+    """The validation recordings, followed as fast as spans of time ask for."""
+    return Track.of(validation, min(_LOCATING, _FAST / held.runs[0].step[0]), growth.begin.fit.model)
+
+
+def _difference(fast: Track, before: Model, after: Model) -> list[Array]:
+    """Energy of the force in which two models differ, without the noise of either [F^2], per run, one value per interval."""
+    change = fast.padded(fast.residual(before) - fast.residual(after))
+    return [moved_back(part, run.sample_time, fast.bandwidth) ** 2 for run, part in zip(fast.runs, change, strict=True)]
+
+
+def _left(held: Track, residual: Array, floor: Sequence[Array]) -> list[Array]:
+    """Energy of the rest above what twins leave at the same speed [F^2], per run, one value per interval."""
     level = float(np.mean([each @ each for each in floor])) / residual.shape[0]
     energy = []
     for run, part in zip(held.runs, held.padded(residual), strict=True):
         h = run.sample_time
         energy.append(np.maximum(steady(moved_back(part, h, held.bandwidth) ** 2, h) - 2.0 * level, 0.0))
-    return locate(held, energy, scales, model)
+    return energy
+
+
+def _whole(validation: Sequence[Record], held: Track, growth: Growth, end: Model, rest: Sequence[Array] | None) -> list[Array]:
+    """Energy of all that the refitted model lacks: of what was found, and of the ``rest`` where that is above the floor."""
+    energy = _difference(_locating(validation, held, growth), growth.begin.fit.model, end)
+    return energy if rest is None else [one + other for one, other in zip(energy, rest, strict=True)]
 
 
 def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation, rest: float) -> Finding:

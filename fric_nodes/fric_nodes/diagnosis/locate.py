@@ -1,6 +1,6 @@
 """Where a mismatch sits: when, and in which regime of the motion.
 
-*When*: the shortest set of short cells of time that holds 95 % of the mismatch's energy, small gaps closed. *In which
+*When*: the shortest set of short cells of time that holds 97 % of the mismatch's energy, small gaps closed. *In which
 regime*: for each quantity that a regime can hang on (speed, time and distance since the last reversal, position, the force,
 load, temperature, time itself) the range that holds four fifths of the energy in the smallest share of the time. Energy spread
 evenly would need four fifths of the time; a quantity of which the energy is independent comes out near that by chance, a
@@ -23,7 +23,7 @@ from .track import Track, smooth
 __all__ = ["Where", "locate"]
 
 _CELL = 0.01  # [s]
-_HELD = 0.95  # of the energy, by the spans of time: of the true one they hold less than of the one that is seen
+_HELD = 0.97  # of the energy, by the spans of time: of the true one they hold less than of the one that is seen
 _GAP = 2.5  # cells between two spans that are closed
 _RANGE = 0.8  # of the energy, by the range of a quantity
 _EVEN = 0.65  # share of the time from which on a range says nothing

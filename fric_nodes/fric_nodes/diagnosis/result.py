@@ -131,6 +131,7 @@ class Diagnosis:
 
     Attributes:
         mismatch: True when something is missing in the nominal model.
+        where: all of it sits, what was found and what is left, in the validation recordings; None when nothing is missing.
         checks: of the instrument.
         nominal: its values, given and refitted.
         findings: what is missing, what explains most first.
@@ -148,6 +149,7 @@ class Diagnosis:
     """
 
     mismatch: bool
+    where: Where | None
     checks: tuple[Check, ...]
     nominal: NominalPart
     findings: tuple[Finding, ...]
@@ -187,6 +189,7 @@ class Diagnosis:
             "format": FORMAT,
             "verdict": self.sentence,
             "mismatch": self.mismatch,
+            "where": _where(self.where),
             "checks": [
                 {"check": c.check, "verdict": c.verdict, "value": c.value, "detail": c.detail, "remedy": c.remedy}
                 for c in self.checks

@@ -75,7 +75,7 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
 
 
 def _spans(found: Diagnosis, number: int) -> list[tuple[float, float]]:
-    where = found.findings[0].where if found.findings else found.unexplained.where
+    where = found.where
     return list(where.time[number]) if where is not None and number < len(where.time) else []
 
 

@@ -3,8 +3,8 @@
 The first finding of a report is what it says first; a report that sees a mismatch and names nothing says ``unknown``, one
 that sees none says ``nothing``, and a diagnosis that failed says ``failure``.
 
-*Where it shows.* The key holds the true energy of the mismatch in cells of 10 ms. What the named spans (all findings
-together) hold is summed over cells, a cell that is partly covered counting in part. The shortest set of spans that holds as
+*Where it shows.* The key holds the true energy of the mismatch in cells of 10 ms. What the named spans (those of all that is
+missing) hold is summed over cells, a cell that is partly covered counting in part. The shortest set of spans that holds as
 much is found on a grid of 50 ms, finer than which nobody looks, by taking the fullest first; ``length ratio`` is the length
 of the named spans over the length of that set.
 
@@ -185,7 +185,7 @@ def outcome_of(key: Mapping[str, Any], folder: Path, noe_own: float | None) -> O
         report = json.loads((folder / "report.json").read_text())
     findings = tuple(_finding(each) for each in report.get("findings", ()))
     held = ratio = None
-    spans = [span for each in findings for span in each.time]
+    spans = [(float(first), float(last)) for first, last in report.get("where", {}).get("time", ())]
     if spans and key["kind"] != "nothing":
         held, ratio = energy_held(np.array(key["energy"]), key["cell"], spans)
     if key["kind"] == "unknown":
