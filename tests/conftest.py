@@ -33,12 +33,12 @@ _KINDS = {
         lambda _: bool(os.environ.get("FRIC_DATA")),
         "set the environment variable FRIC_DATA to the folder that holds emps/, tiago_torso/, ...",
     ),
-    "long": _Kind("takes half a minute or more", lambda config: bool(config.getoption("--long")), "give --long"),
+    "long": _Kind("among the slowest", lambda config: bool(config.getoption("--long")), "give --long"),
 }
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--long", action="store_true", help="also those tests that take half a minute or more each")
+    parser.addoption("--long", action="store_true", help="also the slowest tests")
 
 
 def pytest_configure(config: pytest.Config) -> None:

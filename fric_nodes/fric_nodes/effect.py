@@ -195,11 +195,17 @@ class Effect:
         """The parameters' values in order, defaults filled in; KeyError when one without default is missing."""
         return [float(given[p.name]) if p.name in given or p.default is None else p.default for p in self.parameters]
 
-    def start(self, values: Sequence[float]) -> Array:
-        """The states of ``slip`` at the start of a run with these ``values``, shape ``(n_states,)``."""
+    def start(self, values: Sequence[float], force: float = 0.0) -> Array:
+        """The states of ``slip`` at the start of a run with these ``values``, shape ``(n_states,)``.
+
+        A single bristle is bent as far as the ``force`` [F] asks for that the contact bears then; of several it can't be told.
+        """
         if self.initial is not None:
             return self.initial(*values)
-        return np.zeros(self.n_states(*values) if callable(self.n_states) else self.n_states)
+        states = np.zeros(self.n_states(*values) if callable(self.n_states) else self.n_states)
+        if force != 0.0 and states.shape[0] == 1:
+            states[0] = force / next(x for p, x in zip(self.parameters, values, strict=True) if p.dimension == "F/x")
+        return states
 
     def memory(self, velocity: float) -> Array:
         """The memory at the start of a run, in which the body moves with ``velocity`` [x/s], shape ``(n_memory,)``."""

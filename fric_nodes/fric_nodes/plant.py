@@ -70,6 +70,7 @@ class Plant:
         command: what the command is.
         rate: fastest rate of the plant itself [1/s] from its own values; None: slow.
         driven: the plant whose functions take over when the model has a transmission; None: it can't have one.
+        led: the effort is measured at the contact: what moves the bodies is not in it, nor is their mass to be found.
     """
 
     id: str
@@ -89,6 +90,7 @@ class Plant:
     driven: Plant | None = None
     whole: Callable[..., float] | None = None
     seen: Callable[..., float] | None = None
+    led: bool = False
 
     def total_inertia(self, *values: float) -> float:
         """Mass that a slow command moves [F s^2/x]."""

@@ -136,6 +136,22 @@ def test_signals_from_several_files(tmp_path: Path) -> None:
 # Signals and units
 
 
+def test_a_signal_less_another(tmp_path: Path) -> None:
+    """A load cell that feels a pressure on a bore, too: in another unit and from another file."""
+    file = table(tmp_path / "a.csv")
+    (tmp_path / "b.csv").write_text("p\n" + "\n".join(f"{0.1 * k}" for k in range(N)) + "\n")
+    minus = {"from": "p", "file": "b.csv", "scale": 2.0, "unit": "kN"}
+    record = import_recording(file, {**MAP, "effort": {**MAP["effort"], "minus": minus}})
+    np.testing.assert_allclose(record.effort, 10.0 * VOLTS + 1.0 - 200.0 * np.arange(N), atol=1e-5)
+    for wrong, message in (
+        ({"from": "p", "file": "b.csv", "unit": "A"}, "in N, what is taken away 50 in A"),
+        ({"from": "p", "file": "b.csv", "unit": "mm"}, "no unit of force or torque"),
+        ({"from": "q", "file": "b.csv", "unit": "N"}, "not there"),
+    ):
+        with pytest.raises(ImportingError, match=message):
+            import_recording(file, {**MAP, "effort": {**MAP["effort"], "minus": wrong}})
+
+
 def test_all_signals_and_a_period_for_time(tmp_path: Path) -> None:
     file = tmp_path / "a.npz"
     np.savez(file, x=POSITION_MM, u=VOLTS, v=np.full(N, 60.0), k=np.full(N, 300.0), f=np.full(N, 2.0), p=np.full(N, 6.0))

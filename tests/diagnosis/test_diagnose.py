@@ -85,8 +85,11 @@ def test_the_report_is_plain_data_and_the_grown_model_reads_back(presliding: tup
     _, found = presliding
     report = json.loads(json.dumps(found.report(), allow_nan=False))
     assert report["format"] == "fric-report/1"
-    for key in ("checks", "nominal", "findings", "rejected", "validation", "unexplained", "next_experiment"):
+    for key in ("where", "checks", "nominal", "findings", "rejected", "validation", "unexplained", "next_experiment"):
         assert key in report
+    # One effect explains it all: where the whole mismatch shows is where that effect acts.
+    assert report["where"]["time"]
+    assert report["where"]["time"] == report["findings"][0]["where"]["time"]
     assert {each["effect"] for each in report["rejected"]}.isdisjoint({each["effect"] for each in report["findings"]})
     again = model_from_text(model_to_text(found.model), "grown")
     assert again.names == found.model.names

@@ -41,7 +41,7 @@ def _outcome(kind: str, effects: tuple[str, ...], findings: tuple[Found, ...], *
 
 
 def _found(effect: str, confidence: float = 0.9, runner_up: str = "", component: str = "load") -> Found:
-    return Found(effect, confidence, runner_up, component, ())
+    return Found(effect, confidence, runner_up, component)
 
 
 def test_wilson_interval_of_a_known_case() -> None:

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fric_nodes.bagio.importing import import_recording
 from fric_nodes.diagnosis import Diagnosis, diagnose
+from fric_nodes.diagnosis.blocks import in_blocks
 from fric_nodes.model import Model, build_model, term
+from fric_nodes.model_file import read_model
 from fric_nodes.record import Record, Units
 from scipy.io import loadmat
 
 pytestmark = pytest.mark.real_data
+PUBLISHED = Path(__file__).parents[2] / "config" / "published"
 
 
 def symmetric(mass: float, level: float, viscous: float, bias: float, units: Units | None = None) -> Model:
     """Coulomb friction, viscous friction and an offset: what every axis is assumed to have at first."""
     terms = [term("coulomb", force=level), term("viscous", coefficient=viscous), term("bias", force=bias)]
     return build_model("rigid", {"mass": mass}, terms, units=units or Units())
-
-
-def blocks(record: Record, n_blocks: int) -> tuple[list[Record], list[Record]]:
-    """Contiguous blocks of equal length, every other one held back."""
-    cuts = [k * record.n_samples // n_blocks for k in range(n_blocks + 1)]
-    parts = [record.slice(first, last) for first, last in pairwise(cuts)]
-    return parts[::2], parts[1::2]
 
 
 def error(found: Diagnosis, which: str) -> float:
@@ -45,7 +41,7 @@ def emps() -> Diagnosis:
     signals = loadmat(Path(os.environ["FRIC_DATA"]) / "emps" / "DATA_EMPS.mat")
     effort = (signals["gtau"] * signals["vir"]).ravel()
     record = Record(signals["t"].ravel(), signals["qm"].ravel(), effort, source="EMPS")
-    return diagnose(*blocks(record, 6), symmetric(95.0, 20.0, 200.0, -3.0))
+    return diagnose(*in_blocks([record], 6), symmetric(95.0, 20.0, 200.0, -3.0))
 
 
 def test_the_axis_has_direction_dependent_friction_that_survives_on_blocks_held_back(emps: Diagnosis) -> None:
@@ -55,3 +51,39 @@ def test_the_axis_has_direction_dependent_friction_that_survives_on_blocks_held_
     # As inverse dynamics finds it, too: less viscous friction forward than backward.
     assert -50.0 < found.parameters["asymmetry.coefficient"].value < -25.0
     assert error(emps, "augmented") < 0.75 * error(emps, "refit")
+
+
+def test_a_tribometer_bends_before_it_slides(data_folder: Path) -> None:
+    whole = import_recording(data_folder / "tribometer_loops" / "test_data_2.txt", PUBLISHED / "tribometer.yaml")
+    # Before and after the load is put on and taken off.
+    record = whole.slice(*np.searchsorted(whole.time, (8.5, 204.0)))
+    found = diagnose(*in_blocks([record], 6), read_model(PUBLISHED / "tribometer_nominal.yaml"))
+    first = found.findings[0]
+    assert (first.effect, first.law) == ("presliding", "elasto_plastic")
+    assert first.confidence > 0.9
+    # The slope of the loops by eye: from -2.2 to 2.1 N over 0.105 mm.
+    assert first.parameters["presliding.stiffness"].value == pytest.approx(4.1e4, rel=0.05)
+    assert error(found, "augmented") < 0.15 * error(found, "refit")
+
+
+@pytest.mark.parametrize("seal", ["O", "X"])
+def test_a_seal_rubs_more_under_pressure(data_folder: Path, seal: str) -> None:
+    folder = data_folder / "pneumatic_friction"
+    files = [folder / f"{seal}-ring257_{bar}bar.csv" for bar in (1, 3, 5, 7)]
+    records = [import_recording(file, PUBLISHED / "cylinder.yaml", repair=True) for file in files]
+    found = diagnose(*in_blocks(records, 6), read_model(PUBLISHED / "cylinder_nominal.yaml"))
+    # More than one thing is missing, and not all of it is known; of what is, the pressure does most.
+    assert found.mismatch
+    assert named(found)[0] == "load_dependence"
+    most = next(each for each in found.findings if each.effect == "load_dependence")
+    assert most.share > 0.5
+    assert most.parameters["load_dependence.coefficient"].value > 0.25
+    assert error(found, "augmented") < 0.5 * error(found, "refit")
+
+
+def test_the_lift_of_a_robot_whose_arm_moves_is_said_to_be_unknown(data_folder: Path) -> None:
+    record = import_recording(data_folder / "tiago_torso" / "tiago_effort.csv", PUBLISHED / "torso.yaml", repair=True)
+    found = diagnose(*in_blocks([record], 6), read_model(PUBLISHED / "torso_nominal.yaml"))
+    assert found.mismatch
+    assert found.findings[0].effect == "unknown"
+    assert any(check.check == "end_stop" and check.verdict == "fault" for check in found.checks)

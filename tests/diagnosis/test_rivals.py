@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fric_nodes.diagnosis.along import Along
 from fric_nodes.diagnosis.candidates import candidates, scales_of
 from fric_nodes.diagnosis.fitting import refit, with_room
 from fric_nodes.diagnosis.rivals import implausible
-from fric_nodes.diagnosis.screen import screen
+from fric_nodes.diagnosis.screen import Promise, screen
 from fric_nodes.diagnosis.track import Track
 from fric_nodes.model import Model, Term, build_model, term
 from fric_nodes.record import Record
@@ -61,3 +62,33 @@ def test_a_mode_that_holds_most_of_the_mass_is_the_best_candidate() -> None:
     screened = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False)
     assert screened.tried[0].column.term.effect.key == "compliance/appendage"
     assert screened.tried[0].gain > 0.2 * state.excess
+
+
+def test_beside_a_transmission_a_period_is_told_along_the_motion() -> None:
+    """Where the load's motion isn't measured, the motor's tells well enough which of many periods to follow up."""
+    motor, load, stiffness, damping, viscous, period, step = 0.9, 1.1, 8e4, 20.0, 40.0, 0.021, 1e-3
+
+    def push(t: float) -> float:
+        return 12.0 * float(np.sin(2.0 * np.pi * 0.9 * t)) + 8.0 * float(np.sin(2.0 * np.pi * 2.3 * t))
+
+    def rates(t: float, x: np.ndarray) -> list[float]:
+        given = push(step * np.floor(t / step + 1e-9))
+        spring = stiffness * (x[2] - x[0]) + damping * (x[3] - x[1])
+        ripple = 2.5 * float(np.cos(2.0 * np.pi * x[0] / period))
+        return [x[1], (spring - viscous * x[1] - ripple) / load, x[3], (given - spring) / motor]
+
+    time = np.arange(9000) * step
+    found = solve_ivp(rates, (0.0, time[-1]), np.zeros(4), t_eval=time, max_step=0.5 * step, rtol=1e-8, atol=1e-11)
+    position = found.y[2] + 1e-7 * np.random.default_rng(2).standard_normal(time.shape[0])
+    record = Record(time, position, np.array([push(float(t)) for t in time]), effort_hold="following")
+    terms = [term("viscous", coefficient=viscous), term("compliance", stiffness=stiffness, damping=damping)]
+    start = build_model("rigid", {"mass": motor + load, "load_share": 0.55}, terms)
+    track = Track.of([record], 140.0, start)
+    state = refit(track, start, 6)
+    ripple = next(each for each in candidates(state.fit.model, scales_of(track)) if each.effect.id == "ripple")
+    periods = np.array([trial.values[2] for trial in ripple.trials])
+    kept = [trial.values[2] for trial in Promise(Along(track), state.fit).narrowed(ripple)]
+    assert len(kept) <= 2 < periods.shape[0]
+    assert float(periods[np.argmin(np.abs(np.log(periods / period)))]) in kept
+    best = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False).tried[0]
+    assert best.column.term.effect.id == "ripple"

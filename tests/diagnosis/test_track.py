@@ -78,6 +78,16 @@ def test_a_twin_lacks_nothing_but_noise() -> None:
         assert float(np.std(track.residual(complete, twin))) < 0.02 * LACKING
 
 
+def test_a_twin_of_a_light_motor_that_rattles_in_its_play_stays_where_the_axis_was() -> None:
+    play = term("impact_backlash", "viscoelastic", gap=2e-5, stiffness=1.5e6, damping=60.0)
+    rattling = build_model("rigid", {"mass": MASS, "load_share": 0.85}, [play, *model(force=LACKING).terms])
+    track = Track.of([recorded()], 400.0, model())
+    found = twins(track, rattling, 1)[0]
+    assert float(np.max(np.abs(found.positions[0] - track.runs[0].position))) < 1e-3 * float(np.ptp(recorded().position))
+    # What leads it is small beside the forces that act: it must not be a swing between the stops.
+    assert float(np.std(found.extras[0])) < 0.5 * LACKING
+
+
 def noisy() -> Record:
     """The same, as an encoder with noise reads it."""
     found = recorded()

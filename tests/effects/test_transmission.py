@@ -264,14 +264,20 @@ def test_an_appendage_on_a_body_that_moves_at_constant_speed(zeta: float) -> Non
     def right_side(t: float, y: Array) -> list[float]:
         return [y[1] - v, -(w**2) * y[0] - 2.0 * zeta * w * (y[1] - v)]
 
-    memory = np.array([2e-3, -0.1])
-    end = solve_ivp(right_side, (0.0, h), memory, method="DOP853", rtol=1e-12, atol=1e-15).y[:, -1]
+    memory = np.zeros(effect.n_memory)
+    memory[:2] = 2e-3, -0.1
+    end = solve_ivp(right_side, (0.0, h), memory[:2], method="DOP853", rtol=1e-12, atol=1e-15).y[:, -1]
     c = context(v, h, memory)
     assert effect.force(c, 0, mass, frequency, zeta) == pytest.approx(mass * (end[1] + 0.1) / h, rel=1e-8)
     instant = effect.force(context(v, 0.0, memory), 0, mass, frequency, zeta)
-    assert instant == pytest.approx(mass * right_side(0.0, memory)[1], rel=1e-12)
+    assert instant == pytest.approx(mass * right_side(0.0, memory[:2])[1], rel=1e-12)
     effect.remember(c, 0.0, 0, mass, frequency, zeta)
-    np.testing.assert_allclose(memory, end, rtol=1e-8)
+    np.testing.assert_allclose(memory[:2], end, rtol=1e-8)
+    # A second step of another length, and one of the same, must not use what the first one has left behind for other values.
+    for length in (0.3 * h, 0.3 * h, h):
+        end = solve_ivp(right_side, (0.0, length), end, method="DOP853", rtol=1e-12, atol=1e-15).y[:, -1]
+        effect.remember(context(v, length, memory), 0.0, 0, mass, frequency, zeta)
+        np.testing.assert_allclose(memory[:2], end, rtol=1e-8)
 
 
 def test_an_appendage_is_a_second_mass_on_a_spring() -> None:

@@ -42,6 +42,7 @@ def test_errors_over_standard_errors_have_the_size_they_should(method: str) -> N
     assert 0.5 < float(np.sqrt(np.mean(score**2))) < 1.5
 
 
+@pytest.mark.long
 def test_force_noise_makes_bristles_neither_softer_nor_damped() -> None:
     found = calibrate(AXES["bristled"], "prediction-error", range(500, 504), Options())
     mean = dict(zip(found.names, np.mean(found.estimates, axis=0) / found.truth, strict=True))
@@ -59,7 +60,7 @@ def test_inverse_dynamics_sees_bristles_through_its_filters() -> None:
     assert found.estimates[:, found.names.index("presliding.damping")] == pytest.approx(400.0, rel=0.12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[pytest.mark.long] * (kind == "bootstrap")) for kind in KINDS])
 def test_every_kind_gives_intervals_of_about_the_same_width(kind: str) -> None:
     axis = AXES["rigid"]
     records = [recording(axis, seed) for seed in (21, 22)]

@@ -27,8 +27,6 @@ from sensor_msgs.msg import JointState
 from fric_interfaces.msg import FrictionEstimate, FrictionModel, StampedForce
 from fric_interfaces.srv import FreezeIdentification, ResetIdentification, SaveIdentification, StartIdentification
 
-pytestmark = pytest.mark.alone
-
 # A bias of 0.8 N would be known to 2 % only after 20 s, which is no basis for a limit of 3 %; 2 N is known to 1 %.
 TRUTH = {"mass": 2.0, "coulomb.force": 6.0, "viscous.coefficient": 40.0, "bias.force": 2.0}
 RATE = 500
@@ -221,6 +219,7 @@ terms:
 CHANGE_AT = 12.0  # [s]
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     "estimator", ["rls", pytest.param("ekf", marks=pytest.mark.long), pytest.param("ukf", marks=pytest.mark.long)]
 )

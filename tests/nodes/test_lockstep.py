@@ -33,8 +33,6 @@ from fric_interfaces.msg import Reference, StampedForce
 if TYPE_CHECKING:
     from .conftest import Graph
 
-pytestmark = pytest.mark.alone
-
 H = 0.002
 SAMPLES = 600
 FEWER = 200  # for executors that are slow with four nodes
@@ -164,8 +162,8 @@ def test_four_processes_repeat_themselves_byte_for_byte_and_survive_a_kill(graph
         runs.append({topic: [p for k, p in sorted(listener.by_sample(topic).items()) if k <= SAMPLES - 1] for topic in TYPES})
         _check_against_core(listener)
     assert runs[0] == runs[1]
-    # On an idle machine thousands; beside other work a third of that. A timer in the loop would make it a hundred.
-    assert max(rates) >= 250.0
+    # On an idle machine thousands; beside other work a fraction of that. A timer in the loop would make it a hundred.
+    assert max(rates) >= 150.0
 
     listener.clear()
     plant = graph.start_node("plant", **{**parameters["plant"], "duration": 1e6})

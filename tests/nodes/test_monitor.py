@@ -23,8 +23,6 @@ from sensor_msgs.msg import JointState
 
 from fric_interfaces.msg import Mismatch
 
-pytestmark = pytest.mark.alone
-
 H = 0.002
 COMPILING = 400.0  # [s] in a fresh cache, on a busy machine
 
@@ -117,6 +115,7 @@ def stamp(message: Mismatch) -> float:
     return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     ("after", "force_from", "component", "effects"),
     [
@@ -141,8 +140,9 @@ def test_what_is_switched_on_is_raised_within_five_seconds_and_named(
     assert first.detected
     assert first.joint == "axis"
     assert stamp(first) - switched < 5.0
-    # The stamp is the end of what was looked at, so the machine that simulates may be as slow or fast as it likes.
-    rig.until(lambda: any(stamp(message) - switched > 8.0 for message in rig.mismatches), "the last look", 200.0)
+    # The stamp is the end of what was looked at, so the machine that simulates may be as slow or fast as it likes. The last
+    # look is 8 s after the beginning that the monitor took for it, which may be a little before the change itself.
+    rig.until(lambda: any(stamp(message) - switched > 7.0 for message in rig.mismatches), "the last look", 200.0)
     looks = [message for message in rig.mismatches if message.component]
     # Time is simulated: how many looks fit into it depends on how fast the machine is, so on a busy one the first is too late.
     early = [look for look in looks if stamp(look) - switched < 5.0] or looks[:1]

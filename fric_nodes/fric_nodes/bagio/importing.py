@@ -135,7 +135,15 @@ class _Import:
         """A signal in SI units."""
         table = self._table(entry.file)
         values = _column(table, name, entry.source) * _factor(table, name, entry.scale) + entry.offset
-        return self._to_si(name, values, entry.unit)
+        values = self._to_si(name, values, entry.unit)
+        if entry.minus is None:
+            return values
+        own = self.si[name]
+        taken = self._signal(name, entry.minus)
+        if self.si[name] != own or taken.shape != values.shape:
+            has = f"{values.size} samples in {own}, what is taken away {taken.size} in {self.si[name]}"
+            raise ImportingError(self.path, f"signal '{name}' has {has}", "map columns of one length and one quantity")
+        return values - taken
 
     def _to_si(self, name: str, values: Array, text: str) -> Array:
         found = unit(text)

@@ -39,6 +39,7 @@ class SignalMap(_Strict):
         scale: a factor, or the name of a scalar variable of the file; negative to turn the sign.
         offset: added after the factor [unit].
         file: another file, relative to the folder of the main one.
+        minus: a signal that is taken away from it, such as the force of a pressure from all that a load cell measures.
     """
 
     source: str | int = Field(alias="from")
@@ -46,6 +47,7 @@ class SignalMap(_Strict):
     scale: float | str = 1.0
     offset: float = 0.0
     file: str | None = None
+    minus: SignalMap | None = None
 
 
 class PeriodMap(_Strict):

@@ -42,8 +42,14 @@ def register(app: typer.Typer) -> None:
 
 def diagnose(
     train: Annotated[list[Path], typer.Argument(help="Recordings to learn from: rosbag2 folders or files.")],
-    validate: Annotated[list[Path], typer.Option("--validate", help="Recording that nothing is learnt from; may be repeated.")],
     model: Annotated[Path, typer.Option("--model", help="Model file whose physics is in question.")],
+    validate: Annotated[
+        list[Path] | None, typer.Option("--validate", help="Recording that nothing is learnt from; may be repeated.")
+    ] = None,
+    blocks: Annotated[
+        int | None,
+        typer.Option("--blocks", help="In place of --validate: cut each recording into so many blocks, hold every other back."),
+    ] = None,
     out: OutOption = Path("diagnosis"),
     joint: JointOption = None,
     repair: RepairOption = False,
@@ -55,15 +61,20 @@ def diagnose(
 ) -> None:
     """Find what physics a model leaves out, and write report.html, report.json, model.yaml and prediction.csv."""
     from ..diagnosis import diagnose as find
+    from ..diagnosis.blocks import in_blocks
     from ..model_file import read_model
 
-    same = {path.resolve() for path in train} & {path.resolve() for path in validate}
+    given = validate or []
+    same = {path.resolve() for path in train} & {path.resolve() for path in given}
     if same:
         raise InputError(same.pop(), "is both learnt from and validated on", "hold another recording back for --validate")
+    if bool(given) == (blocks is not None):
+        raise InputError("--validate", "is needed, or --blocks, and not both", "hold a recording back, or blocks: --blocks 6")
     nominal = read_model(model)
     reading = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
-    progress(f"reading {len(train) + len(validate)} recording(s)")
-    records, kept_apart = read_all(train, reading), read_all(validate, reading)
+    progress(f"reading {len(train) + len(given)} recording(s)")
+    records = read_all(train, reading)
+    records, kept_apart = (records, read_all(given, reading)) if blocks is None else in_blocks(records, blocks)
     nominal = replace(nominal, joint=records[0].joint)
     found = find(records, kept_apart, nominal, progress)
     write_diagnosis(out, found, records, kept_apart)

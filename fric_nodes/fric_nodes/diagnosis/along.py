@@ -45,7 +45,8 @@ class Along:
 
     def can(self, model: Model) -> bool:
         """True for models whose force the motion at the sensor tells."""
-        return PLANTS[model.plant.id].driven is not model.plant and bool(np.any(self.moving))
+        at_sensor = PLANTS[model.plant.id].driven is not model.plant and not model.plant.led
+        return at_sensor and bool(np.any(self.moving))
 
     def residual(self, model: Model, extra: Term | None = None) -> Array:
         """The force that ``model``, with the term ``extra``, lacks [F], as the observer would see it, where the axis moves."""

@@ -127,6 +127,8 @@ def candidates(model: Model, scales: Scales) -> list[Candidate]:
             continue
         if (effect.link is not None or effect.play is not None) and PLANTS[model.plant.id].driven is None:
             continue
+        if model.plant.led and effect.place in (Place.COMMAND_PATH, Place.TRANSMISSION):
+            continue  # the force is measured behind both
         if play and (effect.link is None) != (effect.play is None):
             continue  # a spring beyond a play is the same as elastic stops, and one play is enough
         if effect.level is not None and effect.remember is not None and not has_level:
@@ -206,14 +208,14 @@ def _amplitudes(parameter: Parameter, scales: Scales) -> Sequence[float]:
 def _of_dimension(effect: Effect, parameter: Parameter, scales: Scales) -> Array:
     dimension = parameter.dimension
     if dimension == "x/s":
-        return np.geomspace(max(3.0 * scales.slow, 3e-3 * scales.speed), 0.5 * scales.speed, 6)
+        return np.geomspace(max(3.0 * scales.slow, 3e-3 * scales.speed), scales.speed, 7)
     if dimension == "s":
         return np.geomspace(5.0 * scales.step, 0.5 * scales.duration, 10)
     if dimension == "1/s":
         return np.geomspace(2.5, scales.fastest, 14)
     if dimension == "F/x":
         if effect.slip is not None:
-            return np.asarray(scales.level / np.geomspace(max(scales.grain, 1e-5 * scales.travel), 0.03 * scales.travel, 7))
+            return np.asarray(scales.level / np.geomspace(max(scales.grain, 1e-5 * scales.travel), 0.3 * scales.travel, 9))
         if effect.play is not None:
             return np.array([0.25 * scales.mass * (4.0 * math.pi * scales.fastest) ** 2])
         return np.asarray(0.25 * scales.mass * (2.0 * math.pi * np.geomspace(4.0, scales.fastest, 6)) ** 2)

@@ -73,7 +73,7 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
     independent = max(track.independent, 50.0)
     held = _Motions(track.motion, [run.effort for run in track.runs], track.time)
     found: dict[str, Signature] = {}
-    for component, title, columns in _ways(track, held, missing, _rubbing(fit.model, held)):
+    for component, title, columns in _ways(track, held, missing, _rubbing(fit.model, held), fit.model.plant.led):
         n = columns.shape[1]
         left = _left(np.concatenate([nominal, columns[::stride]], axis=1), target)
         signature = _marked(component, title, left / max(alone, 1e-300), n, independent)
@@ -112,8 +112,10 @@ def _rubbing(model: Model, held: _Motions) -> list[Array]:
     ]
 
 
-def _ways(track: Track, held: _Motions, missing: Array, rubbing: Sequence[Array]) -> Iterator[tuple[str, str, Array]]:
-    """Component, way, and its columns, shape ``(n, n_columns)`` each."""
+def _ways(
+    track: Track, held: _Motions, missing: Array, rubbing: Sequence[Array], led: bool
+) -> Iterator[tuple[str, str, Array]]:
+    """Component, way, and its columns, shape ``(n, n_columns)`` each; of a contact where a rig has ``led`` it."""
     rate = [each.velocity for each in held.motion]
     fast = max(float(np.quantile(np.abs(np.concatenate(rate)), 0.9)), 1e-12)
     way = [np.tanh(v / (0.02 * fast)) for v in rate]
@@ -123,8 +125,9 @@ def _ways(track: Track, held: _Motions, missing: Array, rubbing: Sequence[Array]
     yield guideway, "friction whose slope changes with time", _changing(track, rate, held.time)
     driven = [sign * np.abs(u) for sign, u in zip(way, held.effort, strict=True)]
     yield guideway, "friction that goes with the motor's force", _seen(track, [driven])
-    yield "command path", "an actuator whose gain changes with time", _changing(track, held.effort, held.time)
-    yield load, "a mass that changes with time", _changing(track, [each.acceleration for each in held.motion], held.time)
+    if not led:  # what is measured at a contact is behind the drive and the mass
+        yield "command path", "an actuator whose gain changes with time", _changing(track, held.effort, held.time)
+        yield load, "a mass that changes with time", _changing(track, [each.acceleration for each in held.motion], held.time)
     yield load, "a force that swings at one frequency", _tone(track, held.time, missing)
     for lagging in _lags(held.motion):
         yield load, "a force that hangs on the position and lags behind it", _seen(track, lagging)

@@ -26,6 +26,7 @@ from ..instrument import inspect
 from ..model import Model
 from ..record import Array, Record
 from ..threads import linear_algebra_in_one
+from .blocks import one_sided
 from .candidates import Scales, candidates, place_of, scales_of
 from .component import Signature, signatures
 from .confidence import confidence_of, unknown_confidence
@@ -56,6 +57,7 @@ _AS_LIKELY = 0.5  # to be right as to be wrong
 _FIRST_FIT = 6  # iterations, by which starts are compared
 _STANDS_OUT = 10.0  # times the floor
 _LOCATING = 600.0  # [rad/s], for spans of time
+_LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that moves the body
 
 
 class DiagnosisError(InputError):
@@ -82,10 +84,14 @@ def diagnose(
     tell("checking the instrument")
     checks = inspect(train, nominal)
     train, validation, corrected = _corrected(train, validation, checks)
+    apart = one_sided(train, validation)
+    if apart:
+        corrected.append(f"{apart}: what the one shows there the other can't judge")
     conditions = nominal_conditions(train) | dict(nominal.nominal)
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
     tracks, start = _started(nominal, train)
+    _refuse_without_inertia(train, nominal, start)
     parts = excerpt(tracks, start)
     growth = grow(tracks if parts is None else parts.tracks, start, tell)
     searched = list(tracks if parts is None else parts.tracks)
@@ -119,7 +125,7 @@ def _refuse(train: Sequence[Record], validation: Sequence[Record]) -> None:
     for held in validation:
         for other in train:
             same = held.n_samples == other.n_samples and np.array_equal(held.position, other.position)
-            if same and np.array_equal(held.effort, other.effort):
+            if same and np.array_equal(held.effort, other.effort) and np.any(held.mask & other.mask):
                 raise DiagnosisError(
                     held.source, "is the recording that is learnt from, too", "hold another recording back for --validate"
                 )
@@ -128,6 +134,20 @@ def _refuse(train: Sequence[Record], validation: Sequence[Record]) -> None:
             raise DiagnosisError(record.source, "holds nothing but rest", "record the axis in motion")
         if float(np.ptp(record.effort)) == 0.0:
             raise DiagnosisError(record.source, "has no force signal: it never changes", "record the effort, or give --topic")
+
+
+def _refuse_without_inertia(train: Sequence[Record], nominal: Model, start: Model) -> None:
+    """Say that the force isn't the one that moves the body, where hardly any mass fits it.
+
+    Observers count what a body lacks in the force that moves it: one without mass never lacks anything.
+    """
+    if start.total_inertia < _LIGHTEST * nominal.total_inertia:
+        raise DiagnosisError(
+            train[0].source,
+            f"the force doesn't hold the inertia of the model's mass {nominal.total_inertia:.3g}, "
+            f"but of {start.total_inertia:.2g}",
+            "where the force is measured at the contact, make its plant 'contact'; else look at unit and sign (fric doctor)",
+        )
 
 
 def _corrected(
@@ -170,6 +190,8 @@ def _tracks(train: Sequence[Record], start: Model) -> list[Track]:
     """The recordings followed at several bandwidths."""
     step = max(record.sample_time for record in train)
     allowed = [w for w in _BANDWIDTHS if w * step <= _FAST] or [_FAST / step]
+    if start.plant.led:
+        allowed = [min(_BANDWIDTHS[-1], _FAST / step)]
     tracks = [Track.of(train, bandwidth, start) for bandwidth in allowed]
     if not tracks[0].runs:
         raise DiagnosisError(train[0].source, "has no valid part of 200 samples", "record for longer")
@@ -212,7 +234,8 @@ def _concluded(
     seen_rest = max(scored.noe_augmented - noise_floor - sure, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
     seen_rest *= held.unpaid(begin) if end.has_slip_dynamics else 1.0
     rest = min(max(growth.rest, seen_rest), 1.0) if missing else 0.0
-    findings = [_finding(validation, held, growth, end, step, scored, scales, rest) for step in growth.steps]
+    fast = _locating(validation, held, growth)
+    findings = [_finding(fast, held, growth, end, step, scored, scales, rest) for step in growth.steps]
     # What explains most comes first, as far as it is sure to: what mends the form of another's law may be as sure.
     findings.sort(key=lambda each: -each.confidence * each.share)
     likely, stand_in = None, False
@@ -238,7 +261,12 @@ def _concluded(
             # What helps is told all the same; beside something unknown one in ten of such findings was right.
             found = [replace(each, confidence=min(each.confidence, round(1.0 - nobody.confidence, 4))) for each in findings]
             findings = [nobody, *sorted(found, key=lambda each: -each.share)]
-    everything = locate(held, _whole(validation, held, growth, end, remains), scales, end) if missing else None
+    everything = None
+    if missing:
+        energy = _difference(fast, begin, end)
+        if remains is not None:
+            energy = [explained + left_over for explained, left_over in zip(energy, remains, strict=True)]
+        everything = locate(fast, energy, scales, end)
     return Diagnosis(
         mismatch=missing,
         where=everything,
@@ -322,7 +350,7 @@ def _nominal_part(nominal: Model, fit: Fit) -> NominalPart:
 
 
 def _finding(
-    validation: Sequence[Record],
+    fast: Track,
     held: Track,
     growth: Growth,
     end: Model,
@@ -334,7 +362,6 @@ def _finding(
     place = list(end.prefixes).index(step.term)
     effect = end.terms[place].effect
     without = end.with_terms(term for k, term in enumerate(end.terms) if k != place)
-    fast = _locating(validation, held, growth)
     shown = growth.begin.fit.model if len(growth.steps) == 1 else without
     where = locate(fast, _difference(fast, shown, end), scales, end)
     excess = max(step.missing, 1e-300)
@@ -391,12 +418,6 @@ def _left(held: Track, residual: Array, floor: Sequence[Array]) -> list[Array]:
         h = run.sample_time
         energy.append(np.maximum(steady(moved_back(part, h, held.bandwidth) ** 2, h) - 2.0 * level, 0.0))
     return energy
-
-
-def _whole(validation: Sequence[Record], held: Track, growth: Growth, end: Model, rest: Sequence[Array] | None) -> list[Array]:
-    """Energy of all that the refitted model lacks: of what was found, and of the ``rest`` where that is above the floor."""
-    energy = _difference(_locating(validation, held, growth), growth.begin.fit.model, end)
-    return energy if rest is None else [one + other for one, other in zip(energy, rest, strict=True)]
 
 
 def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation, rest: float) -> Finding:

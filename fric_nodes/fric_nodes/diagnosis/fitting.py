@@ -30,6 +30,7 @@ __all__ = [
     "refit",
     "shaken",
     "unseen",
+    "with_amplitudes",
     "with_room",
 ]
 
@@ -40,7 +41,9 @@ _CLEAR = 25.0  # times the floor
 _ASTRAY = 4.0  # times the floor of a simpler model
 _INFLATION = 2.0
 _LIGHTEST = 0.3  # of the mass that a fit began with
-_SHAKES = (0.3, 0.1, 0.03, 0.3, 0.1, 0.03)  # by which values are moved, as shares of themselves
+_SHAKES = (0.3, 0.1, 0.03)  # by which values are moved, as shares of themselves
+_ROUNDS = 2
+_HELPED = 0.98  # of what is left: with more left after a round, there is no further one
 _DRAWN = 8  # places each time
 _AFTER_A_SHAKE = 3  # iterations
 _WELL_KNOWN = 0.3
@@ -162,19 +165,23 @@ def shaken(track: Track, fit: Fit, bounds: Bounds, floor: float) -> Fit:
     # What a recording tells well anyway must not be drawn far: it would drown what the others do.
     spread = np.array([_WELL_KNOWN if "." not in name else 1.0 for name in fit.names])
     best, left = fit, float(fit.residual @ fit.residual)
-    for width in _SHAKES:
-        if left < floor:
+    for _ in range(_ROUNDS):
+        before = left
+        for width in _SHAKES:
+            if left < floor:
+                return best
+            drawn = []
+            for each in random.standard_normal((_DRAWN, len(index))):
+                values = best.model.values
+                values[index] *= np.exp(width * spread * each)
+                drawn.append(best.model.with_values(np.clip(values, low, high)))
+            lacks = mapped(lambda model: float(np.sum(track.residual(model) ** 2)), drawn)
+            again = track.fit(drawn[int(np.argmin(lacks))], fit.names, _AFTER_A_SHAKE, bounds)
+            now = float(again.residual @ again.residual)
+            if now < left:
+                best, left = again, now
+        if left > _HELPED * before:
             break
-        drawn = []
-        for each in random.standard_normal((_DRAWN, len(index))):
-            values = best.model.values
-            values[index] *= np.exp(width * spread * each)
-            drawn.append(best.model.with_values(np.clip(values, low, high)))
-        lacks = mapped(lambda model: float(np.sum(track.residual(model) ** 2)), drawn)
-        again = track.fit(drawn[int(np.argmin(lacks))], fit.names, _AFTER_A_SHAKE, bounds)
-        now = float(again.residual @ again.residual)
-        if now < left:
-            best, left = again, now
     return best
 
 
@@ -192,16 +199,22 @@ def _moved(grown: Model, fit: Fit, tried: Tried) -> Model:
     return grown.with_values(values)
 
 
+def with_amplitudes(held: Term, names: Sequence[str], sizes: Sequence[float]) -> Term:
+    """A term with the parameters ``names`` at ``sizes``, as far as their bounds allow."""
+    wanted = dict(zip(names, sizes, strict=True))
+    values = (
+        float(np.clip(wanted[p.name], p.lower, p.upper)) if p.name in wanted else value
+        for p, value in zip(held.effect.parameters, held.values, strict=True)
+    )
+    return Term(held.effect, tuple(values))
+
+
 def _start(tried: Tried) -> Term:
     held = tried.column.term
-    values = list(held.values)
-    names = [p.name for p in held.effect.parameters]
     if tried.column.amplitudes:
-        for name, value in zip(tried.column.amplitudes, tried.coefficients, strict=True):
-            k = names.index(name)
-            p = held.effect.parameters[k]
-            values[k] = float(np.clip(value, p.lower, p.upper))
-    elif held.effect.neutral is not None:
+        return with_amplitudes(held, tried.column.amplitudes, tried.coefficients.tolist())
+    values = list(held.values)
+    if held.effect.neutral is not None:
         for k, p in enumerate(held.effect.parameters):
             if p.name in held.effect.amplitudes and p.dimension in ("s",):
                 values[k] *= float(np.clip(tried.coefficients[0], 0.3, 3.0))

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from ..model import Model
 from .candidates import candidates, scales_of
 from .fitting import NOTHING, State, best_track, refit
+from .laws import with_best_laws
 from .rivals import BY_CHANCE, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
 from .screen import Screening, Tried, screen
 from .settle import FLOOR_KNOWN, Settled, Step, exchanged, merged, settled
@@ -32,7 +33,8 @@ _FAINT = 0.04  # of the floor, and
 _DRAWS = 40.0  # times what one parameter takes off noise: so little may still be seen clearly
 _ALIKE = 0.8  # of what the best takes off: another that does tells that the cause can't be told
 _TIED = 0.05  # of the floor: no observer tells two that differ by less
-_HARDLY = 0.5  # of what is missing: with more left, another observer may see what it is
+_MUCH = 0.3  # of what is missing: with more left, another observer may see what it is
+_HARDLY = 0.5  # of what is missing: with more left, it is hardly explained
 _TRIED = 0.15  # of the floor: with more left above it, something is fitted in full, whatever it promises at first order
 
 
@@ -91,10 +93,10 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
     tell = progress or (lambda _: None)
     best = _best_growth(tracks, nominal, tell)
     slower = [track for track in tracks if track.bandwidth < best.track.bandwidth]
-    if best.rest > _HARDLY and slower and (best.steps or best.end.excess > NOTHING * best.end.floor):
-        tell(f"most of it stays unexplained to an observer of {best.track.bandwidth:.3g} rad/s; looking with a slower one")
+    if best.rest > _MUCH and slower and (best.steps or best.end.excess > NOTHING * best.end.floor):
+        tell(f"much of it stays unexplained to an observer of {best.track.bandwidth:.3g} rad/s; looking with a slower one")
         other = _best_growth(slower, nominal, tell)
-        if other.steps and other.rest < _HARDLY:
+        if other.steps and other.rest < min(best.rest, _HARDLY):
             return replace(other, beyond=best.rest)
     return best
 
@@ -237,6 +239,8 @@ def _added(
         # What is left may show best to another observer.
         track, state = best_track(tracks, best.fit.model, 6, floors, track)
         state, steps = merged(track, begin, state, steps)
+        if state.excess > _LITTLE * begin.excess and state.excess > NOTHING * state.floor:
+            state, steps = with_best_laws(track, state, steps, tell)
         scales = scales_of(track)
         little = max(_LITTLE * refit(track, begin.fit.model, max_iterations=4).excess, FLOOR_KNOWN * state.floor)
         if state.excess < little:

@@ -177,7 +177,9 @@ class Diagnosis:
         first = self.findings[0] if self.findings else None
         if first is None or first.effect == "unknown":
             where = first.where.regime if first is not None else "not located"
-            return f"Something is missing, and no known effect explains it; it sits here: {where}."
+            helpful = " and ".join(each.title for each in self.findings[1:])
+            left = f" Of its energy {100.0 * first.share:.2g} % stay beside what helps: {helpful}." if first and helpful else ""
+            return f"Something is missing, and no known effect explains it; it sits here: {where}.{left}"
         names = " and ".join(
             f"{each.title} ({100 * each.confidence:.0f} % sure)" for each in self.findings if each.effect != "unknown"
         )

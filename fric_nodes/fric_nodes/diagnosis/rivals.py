@@ -40,6 +40,7 @@ _NEARLY = 0.5  # of what the best takes off: another that does is fitted, too,
 _FITTED = 4  # and at most because they lack least where their fit begins,
 _LAWS = 3  # of them laws of one effect
 _REFINED = 2  # the best, with more iterations
+_IN_REACH = 0.6  # of what is to be beaten, a rough fit takes off before it is worth more iterations
 _ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
 _OF_EXCESS = 0.12  # and of what is missing: less is no explanation
@@ -92,7 +93,8 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         state: what they come to.
         found: the screening beside it.
         scales: of the recordings.
-        to_beat: what something else leaves in their place [F^2]: where that is hardly anything, nobody looks far.
+        to_beat: what something else leaves in their place [F^2]: where that is hardly anything, nobody looks far, and what is
+            far from it is not refined.
     """
     fitted: list[Rival] = []
     much = state.floor + max(_ROUGH * state.excess, OF_FLOOR * state.floor)
@@ -102,6 +104,8 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         fitted.append(_rival(track, state, offer, fit, found))
     fitted = _side_by_side(track, fitted, found.unpaid)
     for k, rival in enumerate(fitted[:_REFINED]):
+        if state.left - rival.left < _IN_REACH * (state.left - to_beat):
+            continue
         bounds = bounds_of(rival.fit.model, scales)
         fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds)
         if to_beat > much and _steps(rival) and unseen(track, fit, fit.residual) > much:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model import Term
+from ..model import Model, Term
 from ..record import Array, Index
 from ..threads import mapped
 from .along import Along
@@ -137,6 +137,9 @@ def restraint(track: Track, fit: Fit) -> float:
 class Promise:
     """Which trials of a candidate promise most, by the force that they add along the measured motion.
 
+    Beside a transmission the motion of the load isn't known. There what the observer sees to be missing is held against the
+    force that a trial would add to the model without the transmission: enough to tell one period or place from another.
+
     Args:
         along: the motion.
         fit: of the model that lacks something.
@@ -144,15 +147,19 @@ class Promise:
 
     def __init__(self, along: Along, fit: Fit) -> None:
         self._along = along
-        self._model = fit.model
-        self._able = along.can(fit.model)
+        behind = not along.can(fit.model)
+        self._model = _without_transmission(fit.model) if behind else fit.model
+        self._able = along.can(self._model)
         if self._able:
             # A low-passed force needs no more rows than these for its projections.
             self._rows = slice(None, None, along.stride)
-            self._base = along.residual(fit.model)[self._rows]
-            columns = along.changes(fit.model, fit.names, fit.scale)[self._rows]
+            self._base = along.residual(self._model)[self._rows]
+            if behind:
+                missing, columns = fit.residual[along.moving][self._rows], fit.jacobian[along.moving][self._rows]
+            else:
+                missing, columns = self._base, along.changes(fit.model, fit.names, fit.scale)[self._rows]
             self._basis, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
-            self._missing = self._base - self._basis @ (self._basis.T @ self._base)
+            self._missing = missing - self._basis @ (self._basis.T @ missing)
 
     def narrowed(self, candidate: Candidate) -> list[Term]:
         """The trials of ``candidate`` that promise most."""
@@ -173,6 +180,10 @@ class Promise:
             return 0.0  # the fit's own parameters do the same
         own, _ = np.linalg.qr(columns / np.maximum(size, 1e-300))
         return float(np.sum((own.T @ self._missing) ** 2))
+
+
+def _without_transmission(model: Model) -> Model:
+    return model.with_terms(held for held in model.terms if held.effect.play is None and held.effect.link is None)
 
 
 def _parts(trial: Term) -> list[Term]:

@@ -18,7 +18,7 @@ from ..record import Array, Record
 from ..threads import mapped
 from .along import Along
 from .candidates import candidates, place_of, scales_of
-from .fitting import bounds_of, free_names
+from .fitting import bounds_of, free_names, with_amplitudes
 from .locate import locate, moved_back, steady
 from .screen import Gram, Promise, blocks_of, columns_of
 from .track import Fit, Track
@@ -192,12 +192,7 @@ def _sized(suspect: _Suspect, held: Term, missing: Array) -> Term:
     if not suspect.amplitudes or not all(np.all(np.isfinite(part)) for part in suspect.columns):
         return held
     sizes, *_ = np.linalg.lstsq(np.column_stack(suspect.columns), -missing, rcond=1e-9)
-    found = dict(zip(suspect.amplitudes, sizes.tolist(), strict=True))
-    values = [
-        min(max(found[p.name], p.lower), p.upper) if p.name in found else value
-        for p, value in zip(held.effect.parameters, held.values, strict=True)
-    ]
-    return replace(held, values=tuple(values))
+    return with_amplitudes(held, suspect.amplitudes, sizes.tolist())
 
 
 def _verdict(ranked: list[_Suspect], energy: float, base: float, regime: str, strength: float, duration: float) -> Suspects:

@@ -30,6 +30,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from ..identification.gauss_newton import Solution, minimise
@@ -43,6 +44,9 @@ from .universe import universe_of
 __all__ = ["Bounds", "Fit", "Motion", "Track", "Twin", "fitted_values", "resolution", "smooth"]
 
 _SMOOTH = 4.0  # times the bandwidth: of the motion along which a force is needed
+_SMOOTH_LED = 2.0  # the same, where a contact is led: less of the encoder's noise
+_SMEARED = 3.0  # time constants of that, over which it smears a turn
+_NEXT_TO_NOTHING = 1e-12  # [x/s], a speed that only has a sign
 _STEP_OF_RATE = 0.2
 _MOST_STEPS = 4  # per sample: the step is implicit, and what is faster than the observer changes nothing that it sees
 _STEP_OF_OBSERVER = 0.4  # of the observer's time constant: shorter ones it can't tell from this
@@ -52,6 +56,7 @@ _LIGHTEST = 4.0  # times lighter than the mass whose impulses lead it, a model a
 _NOTHING = np.zeros(1)
 _TINY = 1e-9  # of its scale, the least that a positive parameter may be
 _SHORTEST = 200  # samples of a run
+_FIRST = 5  # samples, from which the force at its beginning is taken
 _SHAKEN = 0.4  # steps of the encoder that count as its noise
 _LARGEST = 1e6  # of the force range; a model that escapes must cost much, not break the solver
 
@@ -188,6 +193,8 @@ class Track:
 
     def residual(self, model: Model, twin: Twin | None = None) -> Array:
         """The force that ``model`` lacks [F] at the end of each interval, shape ``(n,)``; on a ``twin`` of the recordings."""
+        if model.plant.led:
+            return self._lacking_at_contact(model, twin)
         # The impulses are those of one mass, whatever mass the model has: a light model must not be led with less force.
         return self._followed(model, self.mass, twin)
 
@@ -196,7 +203,7 @@ class Track:
 
         What a model with bristles seems to lack has to be held against that: its position is set.
         """
-        if model.has_slip_dynamics:
+        if model.has_slip_dynamics or model.plant.led:
             return 1.0
         pushed, put = self.residual(model), self._followed(model, None)
         return max(float(pushed @ pushed) / max(float(put @ put), 1e-300), 1.0)
@@ -215,14 +222,63 @@ class Track:
             state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k))
             found = np.empty(effort.shape[0])
             around = run.step, self.n_substeps(model, run), run.load, run.temperature, alpha, beta
-            last = state, *universe.inner_states(model, run.start[1]), found
+            last = state, *self.inner_states(model, k, run.start[1]), found
             if mass is None:
                 universe.loops.observe(values, effort, position, *around, self.noise[k], *last)
             else:
                 gain = min(mass / inertia, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
                 universe.loops.pursue(values, effort, extra, position, *around, gain, self.noise[k], *last)
-            parts.append((inertia if mass is None else mass) * beta / run.sample_time**2 * found)
+            with np.errstate(over="ignore"):  # a model that escapes has no number for it
+                parts.append((inertia if mass is None else mass) * beta / run.sample_time**2 * found)
         return self._finite(self.joined(parts))
+
+    def _lacking_at_contact(self, model: Model, twin: Twin | None) -> Array:
+        """What a contact lacks whose force is measured [F]: no body has to move by itself, it is led along the motion."""
+        found = []
+        for k, run in enumerate(self.runs):
+            motion, effort = self.led_motion[k], run.effort
+            if twin is not None:
+                effort = twin.efforts[k]
+                motion = _motion(replace(run, position=twin.positions[k]), _SMOOTH_LED * self.bandwidth)
+            found.append(self.borne(model, k, motion, effort) - effort)
+        return self._finite(self.seen(found))
+
+    def borne(self, model: Model, k: int, motion: Motion, effort: Array) -> Array:
+        """The force [F] that the contact of ``model`` gives along ``motion`` of run ``k``, shape ``(n,)``.
+
+        Without bristles it is, at rest and where the direction turns, the measured ``effort`` up to what slides in either one.
+        """
+        if model.has_slip_dynamics:
+            return self._along(model, k, motion, motion.velocity)
+        speed = np.abs(motion.velocity)
+        turns = np.diff(np.sign(motion.velocity), append=0.0) != 0.0
+        # A filter that takes the noise off the motion smears its turns.
+        reach = math.ceil(_SMEARED / (_SMOOTH_LED * self.bandwidth * motion.step))
+        loose = binary_dilation((speed <= self._rest(k)) | turns, iterations=reach)
+        speed = np.maximum(speed, _NEXT_TO_NOTHING)
+        ahead, back = (self._along(model, k, motion, np.where(loose, way, motion.velocity)) for way in (speed, -speed))
+        return np.clip(effort, np.minimum(ahead, back), np.maximum(ahead, back))
+
+    def _along(self, model: Model, k: int, motion: Motion, velocity: Array) -> Array:
+        """The force [F] along the positions of ``motion`` with ``velocity`` [x/s], shape ``(n,)``."""
+        universe, run = universe_of(model), self.runs[k]
+        given, friction = np.empty_like(velocity), np.empty_like(velocity)
+        universe.loops.predict(
+            universe.values(model), self.time[k] - 0.5 * motion.step, motion.position, velocity, motion.acceleration,
+            motion.step, run.load, run.temperature, *self.inner_states(model, k, float(motion.velocity[0])), given, friction,
+        )  # fmt: skip
+        return given
+
+    def _rest(self, k: int) -> float:
+        """Speed [x/s] below which the noise of run ``k`` doesn't tell motion from rest."""
+        # White noise, differentiated up to the cut: its variance times h/pi times the integral of the frequency squared.
+        cut = min(_SMOOTH_LED * self.bandwidth, math.pi / self.runs[k].sample_time)
+        return 3.0 * self.noise[k] * math.sqrt(self.runs[k].sample_time * cut**3 / (3.0 * math.pi))
+
+    @cached_property
+    def led_motion(self) -> tuple[Motion, ...]:
+        """The measured motion of each run, as it leads a contact."""
+        return tuple(_motion(run, _SMOOTH_LED * self.bandwidth) for run in self.runs)
 
     def needed(self, model: Model, extra: Term | None = None) -> Array:
         """As :meth:`residual`, by the force that ``model``, with the term ``extra``, needs along the measured motion [F]."""
@@ -232,11 +288,11 @@ class Track:
             universe.put(values, extra)
         motion = self.raw_motion if model.has_slip_dynamics else self.motion
         found = []
-        for run, time, each, given in zip(self.runs, self.time, motion, self._applied(model), strict=True):
+        for k, (run, time, each, given) in enumerate(zip(self.runs, self.time, motion, self._applied(model), strict=True)):
             effort, friction = np.empty_like(time), np.empty_like(time)
             universe.loops.predict(
                 values, time - 0.5 * each.step, each.position, each.velocity, each.acceleration, each.step, run.load,
-                run.temperature, *universe.inner_states(model, float(each.velocity[0])), effort, friction,
+                run.temperature, *self.inner_states(model, k, float(each.velocity[0])), effort, friction,
             )  # fmt: skip
             found.append(effort - given)
         return self._finite(self.seen(found))
@@ -268,6 +324,11 @@ class Track:
     @cached_property
     def _paths(self) -> dict[str, Any]:
         return {}
+
+    def inner_states(self, model: Model, k: int, velocity: float) -> tuple[Array, Array]:
+        """What ``model`` remembers where run ``k`` begins, with ``velocity`` [x/s]; a measured contact is bent by then."""
+        force = float(np.median(self.runs[k].effort[:_FIRST])) if model.plant.led else 0.0
+        return universe_of(model).inner_states(model, velocity, force)
 
     def begin(self, k: int) -> float:
         """Time in its recording at which run ``k`` begins [s]: a part must not take a slow drift for a new one."""

@@ -33,6 +33,10 @@ def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
     """Position at the end of each interval, force that leads, and command over it, of ``model`` led along the run's motion."""
     universe, run = universe_of(model), track.runs[k]
     step = run.sample_time
+    if model.plant.led:
+        motion = track.led_motion[k]
+        force = track.borne(model, k, motion, smooth(run.effort, step, _SMOOTH * track.bandwidth))
+        return motion.position + 0.5 * step * motion.velocity, np.zeros_like(force), force
     position = np.concatenate([[run.start[0]], run.position])
     wanted = smooth(position, step, _SMOOTH * track.bandwidth)
     rate = np.gradient(wanted, step)
@@ -47,7 +51,7 @@ def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
     universe.loops.lead(
         universe.values(model), given,
         wanted[:-1].copy(), rate[:-1].copy(), run.step, track.n_substeps(model, run), run.load, run.temperature,
-        stiffness, damping, state, *universe.inner_states(model, float(rate[0])), there, extra,
+        stiffness, damping, state, *track.inner_states(model, k, float(rate[0])), there, extra,
     )  # fmt: skip
     return there, extra, given
 

@@ -57,9 +57,12 @@ class Universe:
         values[at : at + len(term.values)] = term.values
         values[len(values) - len(self.effects) + self.effects.index(term.effect)] = 1.0
 
-    def inner_states(self, model: Model, velocity: float = 0.0) -> tuple[Array, Array]:
-        """States of the slip dynamics and memory of all effects at the start of a run, with ``velocity`` [x/s]."""
-        slip = [held.effect.start(held.values) for held in model.terms if held.effect.slip is not None]
+    def inner_states(self, model: Model, velocity: float = 0.0, force: float = 0.0) -> tuple[Array, Array]:
+        """States of the slip dynamics and memory of all effects at the start of a run.
+
+        It begins with ``velocity`` [x/s], and under ``force`` [F] at the contact where that is known.
+        """
+        slip = [held.effect.start(held.values, force) for held in model.terms if held.effect.slip is not None]
         memory = [effect.memory(velocity) for effect in self.effects]
         return (slip[0] if slip else np.zeros(0)), np.concatenate([np.zeros(0), *memory])
 

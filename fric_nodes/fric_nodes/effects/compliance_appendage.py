@@ -18,31 +18,38 @@ Source: de Marchi 1998, summed-mode compliance, after Rayleigh 1877 and Thomson 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from ..effect import Context, Effect, Place
-from ..engine.kernel import kernel
+from ..engine.kernel import hidden, kernel
 from ..parameter import Parameter
 
 __all__ = ["EFFECT"]
 
-# The memory: how far the appendage is ahead of the body [x], and its velocity [x/s].
+# The memory: how far the appendage is ahead of the body [x], and its velocity [x/s]; then what the waves of the last step were
+# for (the step [s], the mode's frequency [rad/s], its damping ratio) and these waves, which cost more than the rest of a step.
 
 
 @kernel
-def propagated(r: float, v: float, h: float, w: float, zeta: float) -> tuple[float, float]:
-    """Deflection and its rate after ``h`` [s], from ``r`` and ``v``, while the body's velocity stays constant."""
+def waves(h: float, w: float, zeta: float) -> tuple[float, float]:
+    """The damped cosine, and the damped sine over its frequency [s], after ``h`` [s]."""
     s = zeta * w
     if zeta < 1.0:
         a = w * math.sqrt(1.0 - zeta * zeta)
         fading = math.exp(-s * h)
-        cosine, sine = fading * math.cos(a * h), fading * math.sin(a * h) / a
-    else:
-        a = w * math.sqrt(zeta * zeta - 1.0)
-        slow, fast = math.exp(-(s - a) * h), math.exp(-(s + a) * h)
-        cosine = 0.5 * (slow + fast)
-        # (slow - fast)/(2 a), also where both are nearly the same
-        sine = slow * h if a * h < 1e-8 else -slow * math.expm1(-2.0 * a * h) / (2.0 * a)
-    return r * (cosine + s * sine) + v * sine, v * (cosine - s * sine) - w * w * r * sine
+        return fading * math.cos(a * h), fading * math.sin(a * h) / a
+    a = w * math.sqrt(zeta * zeta - 1.0)
+    slow, fast = math.exp(-(s - a) * h), math.exp(-(s + a) * h)
+    # (slow - fast)/(2 a), also where both are nearly the same
+    return 0.5 * (slow + fast), slow * h if a * h < 1e-8 else -slow * math.expm1(-2.0 * a * h) / (2.0 * a)
+
+
+@kernel
+def known_waves(memory: Any, i: int, h: float, w: float, zeta: float) -> tuple[float, float]:
+    """As :func:`waves`, but those of the last step where they are for the same."""
+    if memory[i + 2] == h and memory[i + 3] == w and memory[i + 4] == zeta:
+        return float(memory[i + 5]), float(memory[i + 6])
+    return waves(hidden(h), w, zeta)
 
 
 @kernel
@@ -51,16 +58,21 @@ def force(c: Context, i: int, mass: float, frequency: float, damping: float) -> 
     r, rate = c.memory[i], c.memory[i + 1] - c.velocity
     if c.step <= 0.0:
         return float(-mass * w * (w * r + 2.0 * damping * rate))
-    _, after = propagated(r, rate, c.step, w, damping)
+    cosine, sine = known_waves(c.memory, i, c.step, w, damping)
+    after = rate * (cosine - damping * w * sine) - w * w * r * sine
     return float(mass * (after - rate) / c.step)
 
 
 @kernel
 def remember(c: Context, base: float, i: int, mass: float, frequency: float, damping: float) -> None:
     w = 2.0 * math.pi * frequency
-    r, rate = propagated(c.memory[i], c.memory[i + 1] - c.velocity, c.step, w, damping)
-    c.memory[i] = r
-    c.memory[i + 1] = rate + c.velocity
+    s = damping * w
+    r, rate = c.memory[i], c.memory[i + 1] - c.velocity
+    cosine, sine = known_waves(c.memory, i, c.step, w, damping)
+    c.memory[i] = r * (cosine + s * sine) + rate * sine
+    c.memory[i + 1] = rate * (cosine - s * sine) - w * w * r * sine + c.velocity
+    c.memory[i + 2], c.memory[i + 3], c.memory[i + 4] = c.step, w, damping
+    c.memory[i + 5], c.memory[i + 6] = cosine, sine
 
 
 def _rate(moving: float, mass: float, frequency: float, damping: float) -> float:
@@ -84,7 +96,7 @@ EFFECT = Effect(
     ),
     force=force,
     remember=remember,
-    n_memory=2,
+    n_memory=7,
     velocities=(1,),
     rate=_rate,
     regime="after every quick change of the force: an oscillation that rides on the motion, always at the same frequency",

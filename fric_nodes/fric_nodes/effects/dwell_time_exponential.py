@@ -14,14 +14,14 @@ import math
 from ..effect import Context, Effect, Place
 from ..engine.kernel import kernel
 from ..parameter import Parameter
-from ..steps.ageing import CREEP_LENGTH, FRESH_SURPLUS, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
+from ..steps.ageing import CREEP_LENGTH, FRESH_SURPLUS, LOOKS_LIKE, REGIME, age, grow_older, raised, renewal_rate
 
 __all__ = ["EFFECT"]
 
 
 @kernel
 def level(c: Context, base: float, i: int, force: float, initial: float, time: float, exponent: float, length: float) -> float:
-    left = math.exp(-((age(c, i, length) / time) ** exponent))
+    left = math.exp(-raised(age(c, i, length) / time, exponent))
     return base + force * (1.0 - left) + initial * left
 
 

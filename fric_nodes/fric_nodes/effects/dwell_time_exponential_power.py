@@ -14,15 +14,15 @@ import math
 from ..effect import Context, Effect, Place
 from ..engine.kernel import kernel
 from ..parameter import Parameter
-from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
+from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, raised, renewal_rate
 
 __all__ = ["EFFECT"]
 
 
 @kernel
 def level(c: Context, base: float, i: int, force: float, time: float, exponent: float, power: float, length: float) -> float:
-    risen = -math.expm1(-((age(c, i, length) / time) ** exponent))
-    return float(base + force * risen**power)
+    risen = -math.expm1(-raised(age(c, i, length) / time, exponent))
+    return float(base + force * raised(risen, power))
 
 
 @kernel

@@ -11,14 +11,14 @@ from __future__ import annotations
 from ..effect import Context, Effect, Place
 from ..engine.kernel import kernel
 from ..parameter import Parameter
-from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, renewal_rate
+from ..steps.ageing import CREEP_LENGTH, LOOKS_LIKE, REGIME, age, grow_older, raised, renewal_rate
 
 __all__ = ["EFFECT"]
 
 
 @kernel
 def level(c: Context, base: float, i: int, force: float, exponent: float, length: float) -> float:
-    return float(base + force * age(c, i, length) ** exponent)
+    return float(base + force * raised(age(c, i, length), exponent))
 
 
 @kernel

@@ -46,7 +46,7 @@ _IMPORTS = (
     "from typing import Any",
     "from fric_nodes.engine.assembled import Inner, Surroundings",
     "from fric_nodes.effect import Context",
-    "from fric_nodes.engine.kernel import kernel, local_array, loop",
+    "from fric_nodes.engine.kernel import hidden, kernel, local_array, loop",
 )
 
 
@@ -128,21 +128,21 @@ def _with_work_space(loop: Callable[..., None], n_constants: Callable[[Array], i
 class _Assembly:
     """The bodies of a model's functions, grown effect by effect; see :mod:`fric_nodes.engine.assembled` for what each is."""
 
-    def __init__(self, at: int, switches: int | None) -> None:
+    def __init__(self, at: int, switches: str | None) -> None:
         self.imports: list[str] = list(_IMPORTS)
         self.level: list[str] = []
         self.force: list[str] = []
         self.remember: list[str] = []
-        self.bends: list[str] = []  # conditions, any of which makes it true; the next alike
-        self.remembers: list[str] = []
+        self.bending: list[Effect] = []
+        self.remembering: list[Effect] = []
         self.slip = "    return 0.0"
         self.command: list[str] = []
         self.play: list[str] = []
         self.prepare: list[str] = []
         self._at = at
         self._switches = switches
+        self._bits: dict[Effect, int] = {}
         self._memory = 0
-        self._constants: list[str] = []
 
     def add(self, number: int, effect: Effect) -> None:
         """Add the effect that is the model's term ``number``."""
@@ -152,16 +152,17 @@ class _Assembly:
             self.imports.append(f"from {function.__module__} import {function.__name__} as {role}_{number}")
 
         def call(role: str, *first: str) -> str:
-            return f"{role}_{number}({', '.join((*first, *parameters))})"
+            return f"{role}_{number}({', '.join((*first, *given))})"
 
-        there, switch = "True", ""
+        switch, given = "", parameters
         if self._switches is not None and effect.neutral is not None:
-            there = f"p[{self._switches + number}] != 0.0"
-            switch = f"if {there}: "
+            switch = f"if {self._switches} & {1 << number}: "
+            given = [f"hidden({each})" for each in parameters]
+            self._bits[effect] = 1 << number
         if effect.uses_acceleration:
-            self.bends.append(there)
+            self.bending.append(effect)
         if effect.remember is not None:
-            self.remembers.append(there)
+            self.remembering.append(effect)
         kept = (str(self._memory),) if effect.n_memory else ()
         if effect.remember is not None:
             self.remember.append(f"    {switch}{call('remember', 'c', 'total' if effect.level else '0.0', *kept)}")
@@ -179,6 +180,12 @@ class _Assembly:
         if effect.slip is not None:
             self.slip = f"    return {call('slip', 'z', 'z_next', '0', 'v', 'h', 'level', *constants)}"
         self._memory += effect.n_memory
+
+    def any_of(self, effects: Sequence[Effect]) -> str:
+        """Condition under which one of ``effects`` is there."""
+        if not all(effect in self._bits for effect in effects):
+            return "True"
+        return f"{self._switches} & {sum(self._bits[effect] for effect in effects)} != 0" if effects else "False"
 
     def _prepare(self, call: Callable[..., str]) -> tuple[str, str]:
         # At most one term has constants, since only slip dynamics take them: its offset is 0.
@@ -200,10 +207,10 @@ def _links(effects: tuple[Effect, ...], at: int) -> list[str]:
 def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
     """Text of the module that binds the structure's functions together."""
     n_parameters = len(plant.parameters) + sum(len(effect.parameters) for effect in effects)
-    parts = _Assembly(len(plant.parameters), n_parameters if switched else None)
+    # Switches are bits of one number, which stays in a register: every term is looked at several times in a step.
+    parts = _Assembly(len(plant.parameters), f"p[{n_parameters}]" if switched else None)
     for number, effect in enumerate(effects):
         parts.add(number, effect)
-    n_parameters += len(effects) if switched else 0
     lines = [
         f'"""Assembled for: {plant.id} | {", ".join(effect.key for effect in effects) or "no terms"}."""',
         *parts.imports,
@@ -213,12 +220,11 @@ def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
         f"MEMORY = {any(effect.remember is not None for effect in effects)}",
         f"N_STATES = {len(plant.states)}",
         f"SEEN, SEEN_RATE = {plant.encoder}",
-        "@kernel\ndef unpacked(p):",
-        f"    return ({''.join(f'p[{k}], ' for k in range(n_parameters))})",
+        *_unpacking(n_parameters, len(effects) if switched else 0),
         "@kernel\ndef bends(p):",
-        f"    return {' or '.join(parts.bends) or False}",
+        f"    return {parts.any_of(parts.bending)}",
         "@kernel\ndef remembers(p):",
-        f"    return {' or '.join(parts.remembers) or False}",
+        f"    return {parts.any_of(parts.remembering)}",
         *_summing("level_sum(c, p)", parts.level),
         "@kernel\ndef level(c, p):",
         "    return max(level_sum(c, p), 0.0)",
@@ -242,6 +248,16 @@ def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
         *("@loop\n" + inspect.getsource(function) for function in loops.LOOPS),
     ]
     return "\n".join(lines)
+
+
+def _unpacking(n_parameters: int, n_switches: int) -> list[str]:
+    """A function that makes a tuple of the parameters and, where there are switches, a whole number with a bit for each."""
+    assert n_switches < 63
+    lines = [f"    if p[{n_parameters + k}] != 0.0: there |= {1 << k}" for k in range(n_switches)]
+    values = "".join(f"p[{k}], " for k in range(n_parameters))
+    if not lines:
+        return ["@kernel\ndef unpacked(p):", f"    return ({values})"]
+    return ["@kernel\ndef unpacked(p):", "    there = 0", *lines, f"    return ({values}there)"]
 
 
 def _summing(head: str, body: list[str]) -> list[str]:

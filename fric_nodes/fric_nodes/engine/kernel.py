@@ -16,21 +16,39 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.core.errors import RequireLiteralValue
 from numba.core.options import DefaultOptions
+from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
-__all__ = ["kernel", "local_array", "loop"]
+__all__ = ["hidden", "kernel", "local_array", "loop"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 # The counting is numba's only option without a documented name; where a version has it no longer, it is only slower.
 _UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+# Neither have those that leave out the ways into a function from Python and from C.
+_UNWRAPPED = {name: True for name in ("no_cpython_wrapper", "no_cfunc_wrapper") if hasattr(DefaultOptions, name)}
 _COMMON: dict[str, Any] = {"error_model": "numpy", "nogil": True, **_UNCOUNTED}
+_TAKEN_IN: dict[str, Any] = {**_COMMON, **_UNWRAPPED, "forceinline": True}
+
+
+class _Kernel(CPUDispatcher):
+    """A compiled function that other compiled ones take in; that from Python is compiled once more, when it is first called."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        if "from_python" not in self.__dict__:
+            self.__dict__["from_python"] = njit(**_COMMON)(self.py_func)
+        return self.__dict__["from_python"](*arguments)
 
 
 def kernel(function: Function) -> Function:
-    """``function``, compiled at its first call, for use in a step loop."""
-    return cast(Function, njit(**_COMMON, forceinline=True)(function))
+    """``function``, compiled at its first call, for use in a step loop.
+
+    It has no ways in from Python and C of its own: a third of the time of compiling a model went into these.
+    """
+    made = njit(**_TAKEN_IN)(function)
+    cast(Any, made).__class__ = _Kernel
+    return cast(Function, made)
 
 
 def loop(function: Function) -> Function:
@@ -66,4 +84,25 @@ local_array = cast(Callable[[int], Any], intrinsic(_local_array))
 
 The compiler sees that no other array overlaps it, and keeps it in registers. An array that is handed in is written to memory
 and read again in every step, since any other store might have changed it: a third of the time of a step.
+"""
+
+
+def _hidden(typing_context: Any, value: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        # A register for whole numbers has the same letter on every machine.
+        whole = context.get_value_type(types.int64)
+        given = builder.bitcast(arguments[0], whole)
+        call = builder.asm(ir.FunctionType(whole, [whole]), "", "=r,0", (given,), side_effect=False)
+        call.attributes.add("nounwind")
+        call.attributes.add("readnone")
+        return builder.bitcast(call, arguments[0].type)
+
+    return types.float64(types.float64), code
+
+
+hidden = cast(Callable[[float], float], intrinsic(_hidden))
+"""``hidden(x)``: x, of which the compiler knows nothing, so that what depends on it is only done where it is asked for.
+
+The compiler takes exponentials for cheap: it would rather evaluate those of all terms, whether a model has the term or not, and
+choose between the results.
 """

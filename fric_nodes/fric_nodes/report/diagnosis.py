@@ -80,7 +80,7 @@ def _spans(found: Diagnosis, number: int) -> list[tuple[float, float]]:
 
 
 def _shaded(plot: go.Figure, spans: Sequence[tuple[float, float]], low: float, high: float) -> go.Figure:
-    inside = [span for span in spans if span[1] >= low and span[0] <= high]
+    inside = [(max(first, low), min(last, high)) for first, last in spans if last >= low and first <= high]
     return shaded(plot, sorted(inside, key=lambda span: span[0] - span[1])[:_MOST_SPANS])
 
 
@@ -99,7 +99,9 @@ def _picture(found: Diagnosis, p: Prediction) -> Section:
     step = float(np.median(np.diff(p.time)))
     width = min(max(round(2.0 / step), 50), p.time.shape[0])
     gain = np.convolve((p.force_refit - p.force_measured) ** 2, np.ones(width), mode="valid")
-    first = int(np.argmax(gain))
+    lasting = p.time[width - 1 :] - p.time[: p.time.shape[0] - width + 1]
+    # What was held back may be in several parts.
+    first = int(np.argmax(np.where(lasting < 1.2 * width * step, gain, -1.0)))
     use = slice(first, first + width)
     plot = stacked([(f"force [{found.given.units.force}]", _curves(found, p, use))], "time [s]", height=340)
     _shaded(plot, _spans(found, 0), float(p.time[use][0]), float(p.time[use][-1]))

@@ -15,7 +15,7 @@ from plotly.subplots import make_subplots
 
 from ..record import Array
 
-__all__ = ["COLOURS", "Curve", "scatter_and_curves", "shaded", "stacked", "thinned"]
+__all__ = ["COLOURS", "Curve", "in_parts", "scatter_and_curves", "shaded", "stacked", "thinned"]
 
 COLOURS: Mapping[str, str] = {
     "measured": "#8593a3",
@@ -26,6 +26,7 @@ COLOURS: Mapping[str, str] = {
     "second": "#2c9a6a",
 }
 _SLOTS = 2000
+_GAP = 50.0  # samples without any, after which a line breaks
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,17 @@ class Curve:
     colour: str
     dash: str = "solid"
     width: float = 1.4
+
+
+def in_parts(x: Array, y: Array) -> tuple[Array, Array]:
+    """``x`` and ``y`` thinned, with a break (NaN) where an ``x`` that always grows does so by far more than else."""
+    step = np.diff(x)
+    grows = x.shape[0] > 2 and bool(np.all(step > 0.0))
+    ends = np.flatnonzero(step > _GAP * np.median(step)) + 1 if grows else np.zeros(0, np.int64)
+    parts = [thinned(a, b) for a, b in zip(np.split(x, ends), np.split(y, ends), strict=True)]
+    pause = np.array([np.nan])
+    joined = [np.concatenate([each for part in parts for each in (part[k], pause)][:-1]) for k in (0, 1)]
+    return joined[0], joined[1]
 
 
 def thinned(x: Array, y: Array) -> tuple[Array, Array]:
@@ -58,9 +70,10 @@ def _layout(plot: go.Figure, height: int) -> go.Figure:
     plot.update_layout(
         template="plotly_white",
         height=height,
-        margin={"l": 64, "r": 16, "t": 28, "b": 46},
+        margin={"l": 64, "r": 16, "t": 48, "b": 46},  # above, the tools' row and the legend's: neither may cover the other
         font={"family": "system-ui, DejaVu Sans, sans-serif", "size": 13, "color": "#1d2733"},
         legend={"orientation": "h", "yanchor": "bottom", "y": 1.0, "x": 0.0},
+        modebar={"bgcolor": "rgba(255, 255, 255, 0)"},
         hovermode="closest",
     )
     plot.update_xaxes(gridcolor="#e8edf2", zerolinecolor="#c9d2dc")
@@ -69,7 +82,7 @@ def _layout(plot: go.Figure, height: int) -> go.Figure:
 
 
 def _line(curve: Curve, thin: bool = True) -> go.Scattergl | go.Scatter:
-    x, y = thinned(curve.x, curve.y) if thin else (curve.x, curve.y)
+    x, y = in_parts(curve.x, curve.y) if thin else (curve.x, curve.y)
     style = {"color": COLOURS[curve.colour], "width": curve.width, "dash": curve.dash}
     return go.Scatter(x=x, y=y, mode="lines", name=curve.name, line=style)
 
@@ -87,7 +100,7 @@ def stacked(panels: Sequence[tuple[str, Sequence[Curve]]], x_label: str, height:
             plot.add_trace(line, row=row, col=1)
         plot.update_yaxes(title_text=label, row=row, col=1)
     plot.update_xaxes(title_text=x_label, row=len(panels), col=1)
-    return _layout(plot, 60 + height * len(panels))
+    return _layout(plot, 80 + height * len(panels))
 
 
 def shaded(plot: go.Figure, spans: Iterable[tuple[float, float]]) -> go.Figure:

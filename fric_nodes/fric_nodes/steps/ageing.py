@@ -16,11 +16,10 @@ from __future__ import annotations
 import math
 
 from ..effect import Context
-from ..engine.kernel import kernel
+from ..engine.kernel import hidden, kernel
 from ..parameter import Parameter
-from .first_order import mean_decay
 
-__all__ = ["CREEP_LENGTH", "FRESH_SURPLUS", "LOOKS_LIKE", "REGIME", "age", "grow_older", "renewal_rate"]
+__all__ = ["CREEP_LENGTH", "FRESH_SURPLUS", "LOOKS_LIKE", "REGIME", "age", "grow_older", "raised", "renewal_rate"]
 
 CREEP_LENGTH = Parameter("length", "D_0", "x", "creep length: sliding by it renews the contacts", positive=True)
 """The parameter that every law of the contact's age shares."""
@@ -47,18 +46,31 @@ LOOKS_LIKE = {
 
 
 @kernel
+def aged(theta: float, speed: float, h: float, length: float) -> float:
+    """The age [s] after ``h`` [s] at ``speed`` [x/s] of a contact of the age ``theta``."""
+    r = speed * h / length
+    if r == 0.0:
+        return theta + h
+    fading = -math.expm1(-r)  # both of the solution's exponentials in one
+    return theta * (1.0 - fading) + h * fading / r
+
+
+@kernel
+def raised(x: float, exponent: float) -> float:
+    """``x`` to the power of ``exponent``; the usual one, 1, skips the general power, which costs more than all the rest."""
+    return x if exponent == 1.0 else float(hidden(x) ** exponent)
+
+
+@kernel
 def age(c: Context, i: int, length: float) -> float:
     """The age of the contact [s] at the instant of ``c``, the middle of a step; ``c.memory[i]`` is the age at its start."""
-    half = 0.5 * c.step
-    r = abs(c.velocity) * half / length
-    return float(c.memory[i] * math.exp(-r) + half * mean_decay(r))
+    return aged(c.memory[i], abs(c.velocity), 0.5 * c.step, length)
 
 
 @kernel
 def grow_older(c: Context, i: int, length: float) -> None:
     """Lead the age of the contact over the step of ``c``."""
-    r = abs(c.velocity) * c.step / length
-    c.memory[i] = c.memory[i] * math.exp(-r) + c.step * mean_decay(r)
+    c.memory[i] = aged(c.memory[i], abs(c.velocity), c.step, length)
 
 
 def renewal_rate(mass: float, surplus: float, length: float) -> float:

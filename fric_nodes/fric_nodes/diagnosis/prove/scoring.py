@@ -62,7 +62,6 @@ class Found:
     confidence: float
     runner_up: str
     component: str
-    time: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -221,7 +220,6 @@ def _finding(entry: Mapping[str, Any]) -> Found:
         confidence=float(entry.get("confidence", math.nan)),
         runner_up=(entry.get("runner_up") or {}).get("effect", ""),
         component=where.get("component", ""),
-        time=tuple((float(first), float(last)) for first, last in where.get("time", ())),
     )
 
 

@@ -1,0 +1,64 @@
+"""The law of an effect that has been found: the usual one, or another that explains much more.
+
+An effect is found by the one of its laws that comes nearest to all others (:func:`fric_nodes.diagnosis.universe.worth_trying`).
+The machine may follow another: bristles that bend elastically up to a sharp corner instead of an exponential, say. What that
+leaves would bring further effects in that only mend the form of the first. So each other law is fitted in the place of the
+usual one, everything else anew, and takes it if it leaves much less on unseen blocks. The effect, its rivals and its place stay
+what they were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+from ..effect import Effect
+from ..effects import EFFECTS
+from ..model import Term
+from .fitting import State, refit
+from .settle import Step
+from .track import Track
+from .universe import worth_trying
+
+__all__ = ["laws_beside", "with_best_laws"]
+
+_BETTER = 0.3  # of what is left, that another law has to take off: what another effect explains, it explains better
+
+
+def with_best_laws(track: Track, state: State, steps: Sequence[Step], tell: Callable[[str], None]) -> tuple[State, list[Step]]:
+    """The fitted model and its steps, with other laws of the effects that came, where these leave much less."""
+    found = list(steps)
+    for number, step in enumerate(steps):
+        model = state.fit.model
+        place = list(model.prefixes).index(step.term)
+        best = state
+        for term in laws_beside(model.terms[place]):
+            tried = refit(track, model.with_terms(term if k == place else held for k, held in enumerate(model.terms)))
+            best = min(best, tried, key=lambda each: each.left)
+        if state.left - best.left < _BETTER * state.excess:
+            continue
+        law = best.fit.model.terms[place].effect.law
+        tell(f"{step.term} by the law {law}: leaves {100.0 * best.excess / state.excess:.0f} % of what was left")
+        found[number] = replace(step, term=best.fit.model.prefixes[place], after=max(step.after - state.left + best.left, 0.0))
+        state = best
+    return state, found
+
+
+def laws_beside(held: Term) -> Iterator[Term]:
+    """Terms of the same effect with laws that aren't tried otherwise and whose values follow from those of ``held``."""
+    given = dict(zip((p.name for p in held.effect.parameters), held.values, strict=True))
+    for effect in EFFECTS.values():
+        if effect.id != held.effect.id or effect.key == held.effect.key or effect in worth_trying() or effect.near:
+            continue
+        if all(p.name in given or p.default is not None for p in effect.parameters):
+            yield _taken_over(effect, given)
+
+
+def _taken_over(effect: Effect, given: dict[str, float]) -> Term:
+    values = []
+    for p in effect.parameters:
+        # A shape means something else in every law.
+        value = p.default if p.name not in given or p.shape else given[p.name]
+        assert value is not None
+        values.append(float(value))
+    return Term(effect, tuple(values))
