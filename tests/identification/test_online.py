@@ -83,6 +83,30 @@ def test_it_follows_a_step_of_friction(mover: Callable[..., Any]) -> None:
     assert value(found, "mass") == pytest.approx(2.0, rel=0.02)
 
 
+@pytest.mark.parametrize("delay", np.arange(8) / 8 * 0.65)
+def test_wherever_in_a_block_the_step_falls_it_is_followed_within_two_seconds(delay: float) -> None:
+    """An axis with a Coulomb force of 6 N, from ``delay`` after 10 s on of 9 N, by an integrator of its own."""
+    step, fine = 0.002, 20
+    time = step * np.arange(7000)
+    force = sum(a * np.sin(2 * np.pi * f * time + p) for a, f, p in ((14, 0.7, 0.0), (9, 1.9, 1.0), (7, 4.3, 2.0)))
+    position, x, v = np.zeros(time.size), 0.0, 0.0
+    for k in range(1, time.size):
+        level = 6.0 if time[k] < 10.0 + delay else 9.0
+        for _ in range(fine):
+            free = v + step / fine * (force[k - 1] - 40.0 * v - 2.0) / 2.0
+            v = math.copysign(max(abs(free) - step / fine * level / 2.0, 0.0), free)
+            x += step / fine * v
+        position[k] = x
+    noise = np.random.default_rng(7)
+    record = Record(time, np.round(position / 1e-7) * 1e-7, force + noise.normal(0.0, 0.3, time.size), effort_hold="following")
+    identifier = OnlineIdentifier(structure(), 60.0)
+    n = int((10.0 + delay) / step)
+    feed(identifier, record.slice(0, n))
+    assert value(identifier.estimate(), "coulomb.force") == pytest.approx(6.0, rel=0.02)
+    feed(identifier, record.slice(n, n + 1000))
+    assert value(identifier.estimate(), "coulomb.force") == pytest.approx(9.0, rel=0.05)
+
+
 def test_bad_samples_are_refused_counted_and_do_no_harm(mover: Callable[..., Any]) -> None:
     record = mover(duration=15.0, asymmetry=0.0).record(noise=0.3, resolution=1e-6)
     clean = OnlineIdentifier(structure(), 30.0)

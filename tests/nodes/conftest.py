@@ -18,6 +18,9 @@ from typing import Any, TypeVar
 
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -55,6 +58,10 @@ class Graph:
         """Destroy ``node`` when the test ends, after the executors."""
         self._nodes.append(node)
         return node
+
+    def model_change(self, node: Node) -> ModelChange:
+        """What lets the plant's model be exchanged while it runs."""
+        return ModelChange(self, node)
 
     def spin(self, *nodes: Node, kind: type[Executor] = SingleThreadedExecutor) -> None:
         """Serve ``nodes`` from a thread until the test ends."""
@@ -126,6 +133,37 @@ class Graph:
         for context in self._contexts:
             context.try_shutdown()
         self._lock.close()
+
+
+class ModelChange:
+    """Exchanges the model in a running plant, and gets the plant's own time of it, which no sender or listener knows.
+
+    Args:
+        graph: has one plant.
+        node: asks, and hears; served from a thread that begins after this.
+    """
+
+    def __init__(self, graph: Graph, node: Node) -> None:
+        self._graph = graph
+        self._since: list[float] = []  # [s]
+        self._client = node.create_client(SetParameters, "plant/set_parameters")
+        node.create_subscription(DiagnosticArray, "/diagnostics", self._on_report, 10)
+
+    def _on_report(self, report: DiagnosticArray) -> None:
+        for status in report.status:
+            self._since.extend(float(pair.value) for pair in status.values if pair.key == "model since [s]")
+
+    def to(self, model_file: Path) -> float:
+        """Let the plant move by another model, and give the stamp [s] of its last state before that."""
+        assert self._client.wait_for_service(timeout_sec=30.0)
+        self._graph.until(lambda: self._since, "the plant's report")
+        before = self._since[-1]
+        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=str(model_file))
+        future = self._client.call_async(SetParameters.Request(parameters=[Parameter(name="model_file", value=value)]))
+        self._graph.until(future.done, "the plant's answer")
+        assert future.result().results[0].successful
+        self._graph.until(lambda: self._since[-1] > before, "the time of the change")
+        return self._since[-1]
 
 
 def _free_domain() -> tuple[Any, int]:

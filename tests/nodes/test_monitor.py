@@ -14,9 +14,6 @@ from fric_nodes.diagnosis.watch import Phase
 from fric_nodes.model import Model, build_model, term
 from fric_nodes.model_file import write_model
 from fric_nodes.nodes.monitor import MonitorNode
-from rcl_interfaces.msg import Parameter as RosParameter
-from rcl_interfaces.msg import ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -48,6 +45,7 @@ class Machine:
         latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.node.create_subscription(Mismatch, "friction/mismatch", self.mismatches.append, latched)
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self.diagnostics.append, 10)
+        self.change = graph.model_change(self.node)
         graph.spin(self.node)
         nominal = graph.folder / "nominal.yaml"
         write_model(
@@ -79,16 +77,9 @@ class Machine:
             self.graph.start_node(name, **common, **own)
 
     def become(self, model: Model) -> float:
-        """Switch something on in the running plant, and give the monitor's time [s] just before."""
+        """Switch something on in the running plant, and give the time [s] of it."""
         write_model(model, self.graph.folder / "after.yaml")
-        client = self.node.create_client(SetParameters, "plant/set_parameters")
-        assert client.wait_for_service(timeout_sec=30.0)
-        before = self.time()
-        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=str(self.graph.folder / "after.yaml"))
-        future = client.call_async(SetParameters.Request(parameters=[RosParameter(name="model_file", value=value)]))
-        self.graph.until(future.done, "the plant's answer")
-        assert future.result().results[0].successful
-        return before
+        return self.change.to(self.graph.folder / "after.yaml")
 
     def time(self) -> float:
         """Stamp of the newest sample that the monitor has seen [s]."""

@@ -95,6 +95,7 @@ class PlantNode(LoopNode):
         self._signals = [ForcePublisher(self, name) for name in self._axis.signal_names]
         self._values: list[float] = []
         self._stamp = 0
+        self._model_since = 0  # [ns] stamp of the last state before this model
         self.create_subscription(force_type(self), "force_command", self._on_command, SAMPLES)
         if self.lock_step:
             self._period_ns = from_seconds(self.period)
@@ -120,10 +121,16 @@ class PlantNode(LoopNode):
             self.refuse("model", error)
             return
         self.counters["models"] += 1
+        self._model_since = self._stamp
+        self.get_logger().info(f"moves by the new model from {1e-9 * self._stamp:.6f} s on")
 
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report."""
-        return {"samples": str(self._sample), "saturated": str(self._axis.saturated)}
+        return {
+            "samples": str(self._sample),
+            "saturated": str(self._axis.saturated),
+            "model since [s]": f"{1e-9 * self._model_since:.6f}",
+        }
 
     def _measure(self, stamp: int) -> None:
         """Fill in the state at ``stamp`` [ns]."""

@@ -17,8 +17,8 @@ residuals, which every real axis has, widen the intervals as they should. While 
 white-noise formula widened by the residuals' first autocorrelation stands in.
 
 A step change of friction shows as residuals of which other values of the parameters would explain nine times as much as
-they usually would, in two blocks running. All but a moment's worth of the old information then goes, values stay, and what
-comes in counts at once.
+they usually would, in two blocks running. All but a moment's worth of the information from before the first of them then
+goes, values return to what they were, and that block is learnt again from the row on that the old values can't explain.
 """
 
 from __future__ import annotations
@@ -49,9 +49,26 @@ _BLOCKS_KEPT = 240
 _CHANGED = 9.0  # what other values would explain of a block's residuals, beside what they usually would
 _USUAL = 0.1  # share of a block in what is usual
 _TOLD = 1e-3  # of a regressor's length, beside the others
-_CHANGED_BLOCKS = 2
 _OLD = 0.05  # of a block: what old information counts after a change
+_UNEXPLAINED = 5.0  # residuals of the old values, beside their usual root mean square, from which a row is of the new ones
+_SPREAD = 2  # rows over which the low-pass filter spreads a step
 _ROWS_PER_PARAMETER = 20  # behind what is called usual
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What has been learnt until some moment."""
+
+    values: Array
+    information: Array
+    scores: Array
+    n_blocks: float
+    energy: float
+    lagged_energy: float
+    weight: float
+    last_residual: float
+    explained: float
+    samples_used: int
 
 
 @dataclass(eq=False)
@@ -70,6 +87,10 @@ class _Block:
     sample_time: float
     sliding: Mask
     clear: Mask
+
+    def used(self, only_clear: bool) -> Mask:
+        """Rows to learn from."""
+        return self.clear if only_clear else self.sliding
 
     def judge(self, rest: float) -> None:
         """Say where it rests, when that is slower than ``rest`` [x/s] for a while."""
@@ -117,7 +138,7 @@ class OnlineIdentifier:
         self._n_blocks = 0.0
         self._energy = self._lagged_energy = self._weight = 0.0
         self._last_residual = 0.0
-        self._n_changed = 0
+        self._suspect: tuple[_Block, _Known] | None = None
         self._explained = 0.0
         self.samples_used = 0
 
@@ -237,12 +258,21 @@ class OnlineIdentifier:
 
     def _learn_block(self, block: _Block) -> bool:
         """Learn from the rows of ``block`` in which the joint slides."""
+        rows = block.used(self._only_clear)
+        suspicious = self._suspicious(block.rows[rows], block.target[rows])
+        if suspicious and self._suspect is not None:
+            self._begin_anew(*self._suspect)
+            self._suspect = None
+        elif suspicious is not None:
+            self._suspect = (block, self._known_so_far()) if suspicious else None
+        return self._learn_rows(block, rows)
+
+    def _learn_rows(self, block: _Block, rows: Mask) -> bool:
+        """Learn from these ``rows`` of ``block``."""
         forgetting = math.exp(-block.row_time / self.forgetting_time) if math.isfinite(self.forgetting_time) else 1.0
         score = np.zeros(block.rows.shape[1])
         n_learnt = 0
-        sliding = block.clear if self._only_clear else block.sliding
-        self._look_for_change(block.rows[sliding], block.target[sliding])
-        for phi, force in zip(block.rows[sliding], block.target[sliding], strict=True):
+        for phi, force in zip(block.rows[rows], block.target[rows], strict=True):
             if float(phi @ phi) > 0.0:
                 score += phi * self._update(phi, float(force), forgetting)
                 n_learnt += 1
@@ -253,29 +283,52 @@ class OnlineIdentifier:
             self._n_blocks = fade * self._n_blocks + 1.0
         return n_learnt > 0
 
-    def _look_for_change(self, rows: Array, target: Array) -> None:
-        """Let the old go when the residuals of these rows, before they are learnt from, say that the axis has changed."""
+    def _suspicious(self, rows: Array, target: Array) -> bool | None:
+        """Whether the residuals of these rows, before they are learnt from, say that the axis has changed; None: too few."""
         n = self._values.shape[0]
         if rows.shape[0] < n or self._weight < _ROWS_PER_PARAMETER * n or self._energy <= 0.0:
-            return
+            return None
         residual = target - rows @ self._values
         basis, triangle = np.linalg.qr(rows / np.maximum(np.linalg.norm(rows, axis=0), 1e-300))
         told = np.abs(np.diag(triangle)) > _TOLD
         explained = float(np.mean((basis.T @ residual)[told] ** 2)) if np.any(told) else 0.0
-        white = self._energy / (self._weight - n)
-        usual = max(self._explained, white)
-        self._n_changed = self._n_changed + 1 if explained > _CHANGED * usual else 0
+        usual = max(self._explained, self._energy / (self._weight - n))
         self._explained += _USUAL * (min(explained, _CHANGED * usual) - self._explained)
-        if self._n_changed < _CHANGED_BLOCKS:
-            return
-        self._n_changed = 0
-        left = _OLD * rows.shape[0] / self._weight
-        self._information *= left
-        self._scores *= left
-        self._n_blocks *= left
-        self._energy *= left
-        self._lagged_energy *= left
-        self._weight *= left
+        return bool(explained > _CHANGED * usual)
+
+    def _known_so_far(self) -> _Known:
+        return _Known(
+            self._values,
+            self._information.copy(),
+            self._scores,
+            self._n_blocks,
+            self._energy,
+            self._lagged_energy,
+            self._weight,
+            self._last_residual,
+            self._explained,
+            self.samples_used,
+        )
+
+    def _begin_anew(self, block: _Block, before: _Known) -> None:
+        """Let go what was known ``before``, and learn again from ``block``, the first after a change of the axis."""
+        rows = block.used(self._only_clear)
+        residual = block.target - block.rows @ before.values
+        changed = np.nonzero(rows & (np.abs(residual) > _UNEXPLAINED * math.sqrt(before.energy / before.weight)))[0]
+        if changed.size:
+            # The low-pass filter spreads the change over its neighbours.
+            rows = rows & (np.arange(rows.size) > changed[0] + _SPREAD)
+        left = _OLD * float(np.sum(block.used(self._only_clear))) / before.weight
+        self._values = before.values
+        self._information = left * before.information
+        self._scores = left * before.scores
+        self._n_blocks = left * before.n_blocks
+        self._energy = left * before.energy
+        self._lagged_energy = left * before.lagged_energy
+        self._weight = left * before.weight
+        self._last_residual, self._explained = before.last_residual, before.explained
+        self.samples_used = before.samples_used
+        self._learn_rows(block, rows)
 
     def _update(self, phi: Array, force: float, forgetting: float) -> float:
         """One row into the estimate; the residual before it [F]."""
