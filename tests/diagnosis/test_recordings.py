@@ -87,3 +87,21 @@ def test_the_lift_of_a_robot_whose_arm_moves_is_said_to_be_unknown(data_folder: 
     assert found.mismatch
     assert found.findings[0].effect == "unknown"
     assert any(check.check == "end_stop" and check.verdict == "fault" for check in found.checks)
+
+
+@pytest.mark.parametrize(("number", "expected"), [(1, ["stribeck"]), (2, [])])
+def test_a_lead_screw_has_a_stribeck_effect_and_an_anti_backlash_screw_none(
+    data_folder: Path, number: int, expected: list[str]
+) -> None:
+    folder = data_folder / "screw_drives" / f"driveNo{number}" / "steady_state" / "0.096kg"
+    runs = [import_recording(file, PUBLISHED / "screw.yaml") for file in sorted(folder.glob("*.csv"))]
+    # Every other speed is held back, in both directions.
+    runs.sort(key=lambda run: (round(float(np.median(np.abs(np.diff(run.position) / np.diff(run.time)))), 2), run.source))
+    learnt, kept_apart = ([run for k, run in enumerate(runs) if (k // 2) % 2 == side] for side in (0, 1))
+    found = diagnose(learnt, kept_apart, read_model(PUBLISHED / "screw_nominal.yaml"))
+    assert [each.effect for each in found.findings] == expected
+    if expected:
+        assert found.findings[0].confidence > 0.9
+        assert found.validation.noe_augmented < 0.3 * found.validation.noe_refit
+    else:
+        assert not found.mismatch

@@ -33,8 +33,9 @@ from .confidence import confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, free_names, refit
 from .grow import Growth, grow
+from .ladder import concluded_by_means, ladder_of
 from .locate import Where, locate, moved_back, steady
-from .result import Diagnosis, Estimate, Finding, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
+from .result import Diagnosis, Estimate, Finding, Grown, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
 from .rivals import FAR_OFF, mass_off
 from .screen import Tried
 from .settle import FLOOR_KNOWN, Step
@@ -87,6 +88,10 @@ def diagnose(
     apart = one_sided(train, validation)
     if apart:
         corrected.append(f"{apart}: what the one shows there the other can't judge")
+    ladder = ladder_of(train, validation, nominal)
+    if ladder is not None:
+        tell("every recording is at one speed: comparing the means of the runs")
+        return concluded_by_means(ladder, validation, nominal, checks, corrected)
     conditions = nominal_conditions(train) | dict(nominal.nominal)
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
@@ -283,8 +288,19 @@ def _concluded(
         prediction=tuple(_predictions(validation, held, left)),
         notes=(*corrected, *_reservations(growth, nominal, far_off and bool(growth.steps))),
         bandwidth=held.bandwidth,
-        growth=growth,
+        grown=_grown(growth),
     )
+
+
+def _grown(growth: Growth) -> tuple[Grown, ...]:
+    """How the model grew, on blocks of the learning recordings left out in turn."""
+    excess = max(growth.begin.excess, 1e-300)
+    found = [Grown("", 1.0, "")]
+    for step in growth.steps:
+        rival = next(iter(step.rivals), None)
+        beside = "" if rival is None else f"{rival.effect.id}: {100 * max(rival.left - growth.begin.floor, 0.0) / excess:.3g} %"
+        found.append(Grown(step.term, max(step.after - growth.begin.floor, 0.0) / excess, beside))
+    return tuple(found)
 
 
 def _paired(growth: Growth, noe: dict[str, float], noise_floor: float) -> bool:

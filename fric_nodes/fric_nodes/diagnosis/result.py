@@ -10,13 +10,13 @@ from typing import Any
 from ..instrument import Finding as Check
 from ..model import Model
 from ..record import Array
-from .grow import Growth
 from .locate import Where
 
 __all__ = [
     "Diagnosis",
     "Estimate",
     "Finding",
+    "Grown",
     "NominalPart",
     "Prediction",
     "Rejected",
@@ -96,6 +96,15 @@ class Rejected:
 
 
 @dataclass(frozen=True)
+class Grown:
+    """A term that came, what it left of the missing force's energy above the floor, and what its best rival would have left."""
+
+    term: str
+    left: float
+    beside: str
+
+
+@dataclass(frozen=True)
 class Validation:
     """NOE on recordings that no fit has seen [%], and what noise alone leaves."""
 
@@ -144,8 +153,9 @@ class Diagnosis:
         given: the nominal model as it came.
         prediction: forces of each validation recording.
         notes: what was corrected or left out before.
-        bandwidth: of the observer that tells the missing force [rad/s].
-        growth: how the model grew, for the report.
+        bandwidth: of the observer that tells the missing force [rad/s]; 0 where means were compared.
+        grown: how the model grew, for the report: the refitted nominal first, its term empty.
+        by_means: True where means of runs at constant speeds were compared, not samples.
     """
 
     mismatch: bool
@@ -163,12 +173,18 @@ class Diagnosis:
     prediction: tuple[Prediction, ...]
     notes: tuple[str, ...]
     bandwidth: float
-    growth: Growth
+    grown: tuple[Grown, ...]
+    by_means: bool = False
 
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
         v = self.validation
+        if not self.mismatch and self.by_means:
+            return (
+                f"No term of the friction curve is missing: the refitted one leaves an NOE of {v.noe_refit:.3g} % of the "
+                f"means, of which {v.noise_floor:.3g} % are their own errors and the rest scatters from run to run."
+            )
         if not self.mismatch:
             return (
                 f"Nothing is missing: the refitted model leaves an NOE of {v.noe_refit:.3g} %, and the instruments alone leave "
@@ -212,7 +228,7 @@ class Diagnosis:
             "unexplained": {"share": self.unexplained.share, "where": _where(self.unexplained.where)},
             "next_experiment": self.next_experiment,
             "notes": list(self.notes),
-            "observer_bandwidth": self.bandwidth,
+            "observer_bandwidth": None if self.by_means else self.bandwidth,
         }
         found: dict[str, Any] = _finite(report)
         return found

@@ -24,7 +24,7 @@ from ..record import Array, Record
 from .free_parameters import FreeParameters
 from .result import IdentificationError, Method, Options, Score
 from .static_maps.break_away import BreakAway, break_aways, onsets
-from .static_maps.curve import Choice, Points, choose
+from .static_maps.curve import Choice, Curve, Points, choose
 from .static_maps.load import Line, LoadLaw, MeanForce, area_of, load_law
 from .static_maps.parts import Motion, Part, condensed, find_parts, motion_of
 from .static_maps.presliding import Compliance, Presliding, Reversal, reversals, rig_compliance, serial_mean, summary
@@ -34,7 +34,7 @@ from .static_maps.verdict import messages_of, status_of
 from .static_maps.weighted import as_normal
 from .verdict import warnings_of
 
-__all__ = ["METHOD", "fit", "static_map"]
+__all__ = ["METHOD", "curve_terms", "fit", "settled_means", "static_map"]
 
 _FEWEST_SAMPLES = 50
 _SAME_SPEED = 0.1
@@ -171,15 +171,31 @@ def _values(choice: Choice | None, loads: LoadLaw | None) -> tuple[list[Term], d
     if choice is None:
         return [], {}, np.zeros((0, 0))
     best = choice.best
+    terms = curve_terms(best)
     by_name = dict(zip(best.candidate.names, best.values.tolist(), strict=True))
-    grouped: dict[str, dict[str, float]] = {}
-    for name, value in by_name.items():
-        effect, parameter = name.split(".")
-        grouped.setdefault(effect, {})[parameter] = value
-    laws = {"stribeck": best.candidate.stribeck}
-    terms = [term(effect, laws.get(effect, ""), **given) for effect, given in grouped.items()]
     wide = as_normal(best.freedom) * choice.widening
     return terms, {name: (value, k) for k, (name, value) in enumerate(by_name.items())}, best.covariance * np.outer(wide, wide)
+
+
+def curve_terms(curve: Curve) -> list[Term]:
+    """The terms of a model that has the curve's force at constant speeds."""
+    grouped: dict[str, dict[str, float]] = {}
+    for name, value in zip(curve.candidate.names, curve.values.tolist(), strict=True):
+        effect, parameter = name.split(".")
+        grouped.setdefault(effect, {})[parameter] = value
+    laws = {"stribeck": curve.candidate.stribeck}
+    return [term(effect, laws.get(effect, ""), **given) for effect, given in grouped.items()]
+
+
+def settled_means(records: Sequence[Record], options: Options) -> tuple[list[MeanForce], list[str]]:
+    """Mean forces of the settled parts of each record, and sentences on what looked like one and is none.
+
+    Args:
+        records: recordings of one machine under one load.
+        options: the velocity of rest, where it isn't to be found.
+    """
+    looks = [_look(record, "", 0.0, options) for record in records]
+    return _means(looks, 0.0), condensed(note for look in looks for note in look.notes)
 
 
 def _bristles(found: Sequence[Presliding], compliance: Compliance | None) -> tuple[float, float] | None:

@@ -51,7 +51,9 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
             ),
         ),
     ]
-    if found.prediction and found.prediction[0].time.size:
+    if found.by_means:
+        sections.append(_over_speed(found, validation))
+    elif found.prediction and found.prediction[0].time.size:
         sections.append(_picture(found, found.prediction[0]))
         sections.append(_whole(found))
         sections.append(_regimes(found, validation[0]))
@@ -127,6 +129,33 @@ def _whole(found: Diagnosis) -> Section:
     return Section("Measured and predicted", tuple(figures))
 
 
+def _over_speed(found: Diagnosis, validation: Sequence[Record]) -> Section:
+    """Mean forces of the runs held back over their speed, measured and predicted."""
+    pairs = [(p, record) for p, record in zip(found.prediction, validation, strict=True) if p.time.size]
+    units = found.given.units
+    velocity = np.array([np.polyfit(record.time[record.mask], record.position[record.mask], 1)[0] for _, record in pairs])
+    measured, refit, grown = (
+        np.array([float(np.mean(signal)) for signal in signals])
+        for signals in zip(*((p.force_measured, p.force_refit, p.force_augmented) for p, _ in pairs), strict=True)
+    )
+    order = np.argsort(velocity)
+    curves = []
+    for sign in (-1.0, 1.0):
+        way = order[sign * velocity[order] > 0.0]
+        name = "forward" if sign > 0.0 else "backward"
+        curves.append(Curve(f"nominal, refitted, {name}", velocity[way], refit[way], "before"))
+        if found.mismatch:
+            curves.append(Curve(f"with what was missing, {name}", velocity[way], grown[way], "after"))
+    label = f"velocity [{units.position}/s]"
+    points = ("measured, mean of each run held back", velocity, measured)
+    force = scatter_and_curves(points, curves, label, f"force [{units.force}]", size=8)
+    lacking = ("missing in the refitted nominal", velocity, measured - refit)
+    more = [Curve("missing in the grown model", velocity[order], (measured - grown)[order], "after")] if found.mismatch else []
+    rest = scatter_and_curves(lacking, more, label, f"missing force [{units.force}]", 340, size=8)
+    caption = "Each point is one run held back. Drag to zoom, double click to go back."
+    return Section("The difference", (figure(force, caption), figure(rest, "What is missing over velocity.")))
+
+
 def _regimes(found: Diagnosis, record: Record) -> Section:
     """What is missing over speed and over position, before and after."""
     p = found.prediction[0]
@@ -186,15 +215,15 @@ def _finding_section(each: Finding, number: int) -> Section:
 
 
 def _growth_section(found: Diagnosis) -> Section:
-    growth = found.growth
-    excess = max(growth.begin.excess, 1e-300)
-    rows = [("refitted nominal", "100 %", "")]
-    for step in growth.steps:
-        left = max(step.after - growth.begin.floor, 0.0) / excess
-        rival = next(iter(step.rivals), None)
-        beside = "" if rival is None else f"{rival.effect.id}: {100 * max(rival.left - growth.begin.floor, 0.0) / excess:.3g} %"
-        rows.append((f"with {step.term}", f"{100 * left:.3g} %", beside))
+    rows = [
+        (f"with {each.term}" if each.term else "refitted nominal", f"{100 * each.left:.3g} %", each.beside)
+        for each in found.grown
+    ]
     note = "Left of the missing force's energy above the floor, on blocks of the learning recordings left out in turn."
+    if found.by_means:
+        note = (
+            "Left of the weighted squares by which the means of the runs learnt from miss the curve, above what chance leaves."
+        )
     return Section(
         "How the model grew",
         (table(("model", "left", "with the next best instead"), rows, text_columns=(0, 2)), paragraph(note, "note")),

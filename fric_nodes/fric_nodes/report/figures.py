@@ -125,14 +125,19 @@ def shaded(plot: go.Figure, spans: Iterable[tuple[float, float]]) -> go.Figure:
 
 
 def scatter_and_curves(
-    points: tuple[str, Array, Array] | None, curves: Sequence[Curve], x_label: str, y_label: str, height: int = 420
+    points: tuple[str, Array, Array] | None,
+    curves: Sequence[Curve],
+    x_label: str,
+    y_label: str,
+    height: int = 420,
+    size: int = 3,
 ) -> go.Figure:
     """A cloud of measured points with curves over it; curves aren't thinned."""
     plot = go.Figure()
     if points is not None:
         name, x, y = points
         step = max(x.shape[0] // 4000, 1)
-        marker = {"size": 3, "color": COLOURS["measured"], "opacity": 0.45}
+        marker = {"size": size, "color": COLOURS["measured"], "opacity": 0.45 if size < 5 else 0.9}
         plot.add_trace(go.Scatter(x=x[::step], y=y[::step], mode="markers", name=name, marker=marker))
     for curve in curves:
         plot.add_trace(_line(curve, thin=False))

@@ -32,7 +32,7 @@ from scipy import stats
 
 from ...record import Array
 
-__all__ = ["Candidate", "Choice", "Curve", "Points", "choose", "columns_of"]
+__all__ = ["Candidate", "Choice", "Curve", "Points", "choose", "columns_of", "fitted"]
 
 _SIGNIFICANT = 0.01
 _DRAWS = 1999
@@ -73,6 +73,11 @@ class Candidate:
         found += ["asymmetry.coefficient"] if self.asymmetry else []
         found += ["stribeck.force", "stribeck.velocity"] if self.stribeck else []
         return tuple(found)
+
+    def holds(self, other: Candidate) -> bool:
+        """Whether it has every term of ``other``."""
+        plain = all(getattr(self, name) or not getattr(other, name) for name in ("viscous", "quadratic", "asymmetry"))
+        return plain and other.stribeck in ("", self.stribeck)
 
     @property
     def title(self) -> str:
@@ -205,8 +210,14 @@ def _best_velocity(candidate: Candidate, points: Points, root: Array) -> float:
     return best
 
 
-def _fit(candidate: Candidate, points: Points, scatter: float) -> Curve | None:
-    """The candidate's curve; None where a coefficient has a sign that it can't have, or there are too few points."""
+def fitted(candidate: Candidate, points: Points, scatter: float) -> Curve | None:
+    """The curve of ``candidate``; None where a coefficient has a sign that it can't have, or there are too few points.
+
+    Args:
+        candidate: its terms.
+        points: the means.
+        scatter: tau, from run to run [F].
+    """
     n = points.velocity.shape[0]
     count = len(candidate.names)
     if n - count - 1 <= 1:
@@ -281,22 +292,24 @@ def _test_stribeck(base: Candidate, points: Points, scatter: float, rng: np.rand
     return found, float((1 + np.sum(by_chance >= found)) / (1 + _DRAWS))
 
 
-def choose(points: Points, seed: int = 1) -> Choice:
+def choose(points: Points, seed: int = 1, at_least: Candidate | None = None) -> Choice:
     """The curve that ``points`` show.
 
     Args:
         points: at least three, of both directions.
         seed: of the draws behind the test for a Stribeck effect.
+        at_least: terms that every curve has, however small they come out.
     """
     several = points.n_speeds
     viscous = (False, True) if several >= 2 else (False,)
     more = (False, True) if several >= 3 else (False,)
     laws = ("", *_LAWS) if several >= 4 else ("",)
     every = [Candidate(v, s, q, a) for v, s, q, a in product(viscous, laws, more, viscous)]
+    every = [c for c in every if at_least is None or c.holds(at_least)]
     n = points.velocity.shape[0]
     rich = [c for c in every if n - len(c.names) >= 3]
     scatter = min((_scatter(c, points) for c in rich[-1:]), default=0.0)
-    found = [curve for c in every if (curve := _fit(c, points, scatter)) is not None]
+    found = [curve for c in every if (curve := fitted(c, points, scatter)) is not None]
     if not found:
         found = [_mean_only(points)]
     found.sort(key=lambda curve: curve.criterion)
