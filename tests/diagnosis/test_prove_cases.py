@@ -96,6 +96,25 @@ def test_the_energy_adds_up_to_the_strength_and_shows_when_a_payload_joins() -> 
     assert json.loads(json.dumps(dict(case.key)))["components"] == ["load"]
 
 
+def test_an_effect_beside_physics_outside_the_vocabulary() -> None:
+    orders = plan(80, 4, "mixed")
+    assert {order.kind for order in orders} == {"mixed", "unknown"}
+    assert sum(order.kind == "mixed" for order in orders) == 40
+    for order in orders:
+        if order.kind == "mixed":
+            assert order.names[0] in CONCEALED
+            assert not CONCEALED[order.names[0]].needs & OUTSIDE[order.names[1]].lacks
+    case = draw(7, "mixed", ("stribeck", "payload_step"), "mixed")
+    assert case.key["effects"] == ["stribeck", "unknown"]
+    assert case.key["physics_outside"] == "payload_step"
+    # Both are there, the one that a model can have in the true structure.
+    assert {"stribeck", "payload"} <= set(case.key["physics"])
+    assert "stribeck" in case.key["true_structure"]
+    assert case.key["noe_refit"] >= 15.0 * case.key["noise_floor"]
+    with pytest.raises(InputError, match="payload_step"):
+        draw(7, "mixed", ("payload_step", "stribeck"), "mixed")
+
+
 def test_other_forms_and_rates() -> None:
     assert draw(4, "moderate", "presliding", "form").key["forms"][0] > 0
     half, double = draw(4, "moderate", "viscous", "half-rate"), draw(4, "moderate", "viscous", "double-rate")
@@ -112,4 +131,4 @@ def test_refusals() -> None:
         plan(10, 1, "odd")
     with pytest.raises(InputError, match="cases"):
         plan(0, 1)
-    assert set(VARIANTS) == {"standard", "form", "half-rate", "double-rate"}
+    assert set(VARIANTS) == {"standard", "form", "half-rate", "double-rate", "mixed"}

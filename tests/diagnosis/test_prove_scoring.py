@@ -63,6 +63,8 @@ def test_what_counts_as_right() -> None:
     assert _outcome("unknown", ("unknown",), (_found("unknown"),)).right
     assert not _outcome("unknown", ("unknown",), (_found("unknown", component="sensor"),)).right
     assert not _outcome("unknown", ("unknown",), (_found("ripple"),)).right
+    assert _outcome("mixed", ("ripple", "unknown"), (_found("unknown"), _found("ripple", 0.3))).right
+    assert not _outcome("mixed", ("ripple", "unknown"), (_found("unknown"), _found("bias", 0.3))).right
 
 
 def test_energy_within_spans_against_the_shortest_set() -> None:

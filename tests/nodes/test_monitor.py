@@ -63,7 +63,11 @@ class Machine:
         common = {"lock_step": "true", "period": H}
         motion = {"duration": 600.0, "ramp": 0.2, "frequency_low": 0.5, "frequency_high": 4.0, "amplitude": 0.02, "speed": 0.15}
         parameters = {
-            "excitation": {**{f"multisine.{key}": value for key, value in motion.items()}, "wait_for_subscribers": 2},
+            "excitation": {
+                **{f"multisine.{key}": value for key, value in motion.items()},
+                "wait_for_subscribers": 2,
+                "repeat": "true",
+            },
             "compensator": {"model_file": self.graph.folder / "before.yaml"},
             "pid": {"kp": 2e4, "ki": 5e5, "kd": 300.0, "filter_time": 0.001, "force_limit": 80.0},
             "plant": {
@@ -146,6 +150,17 @@ def test_what_is_switched_on_is_raised_within_five_seconds_and_named(
     assert named.regime
     assert named.effect in named.detail
     rig.until(lambda: rig.diagnostics and rig.diagnostics[-1].status[0].message == "mismatch detected", "a diagnosis")
+
+
+@pytest.mark.long
+@pytest.mark.timeout(2400)
+def test_half_an_hour_in_which_nothing_changes_is_silent(machine: Any) -> None:
+    rig = machine(name_component=False)
+    rig.until(rig.monitor.prepared, "everything is compiled", COMPILING)
+    rig.start()
+    rig.until(lambda: rig.time() > 1800.0, "half an hour of the machine's time", 2300.0)
+    assert rig.mismatches == []
+    assert rig.monitor.watch.phase is Phase.WATCHING
 
 
 def test_bad_messages_are_counted_and_survived(machine: Any) -> None:

@@ -24,7 +24,10 @@ def prove(
     seed: Annotated[int, typer.Option("--seed", help="Of all cases; the same seed conceals the same physics.")] = 1,
     variant: Annotated[
         str,
-        typer.Option("--variant", help="standard, form (laws other than the candidates' own), half-rate or double-rate."),
+        typer.Option(
+            "--variant",
+            help="standard, form (laws other than the candidates' own), half-rate, double-rate, or mixed (with other physics).",
+        ),
     ] = "standard",
     jobs: Annotated[int | None, typer.Option("--jobs", help="Processes; as many as there are cores when not given.")] = None,
     as_json: JsonOption = False,

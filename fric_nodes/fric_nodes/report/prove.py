@@ -25,6 +25,7 @@ _KINDS = {
     "pair": "two effects",
     "unknown": "outside the vocabulary",
     "nothing": "nothing missing",
+    "mixed": "one effect, one outside the vocabulary",
 }
 
 
@@ -116,7 +117,13 @@ def _location(outcomes: Sequence[Outcome]) -> Section | None:
     if not located:
         return None
     plot = go.Figure()
-    for kind, colour in (("moderate", "after"), ("pair", "second"), ("unknown", "before"), ("weak", "measured")):
+    for kind, colour in (
+        ("moderate", "after"),
+        ("pair", "second"),
+        ("unknown", "before"),
+        ("weak", "measured"),
+        ("mixed", "true"),
+    ):
         part = [each for each in located if each.kind == kind]
         plot.add_trace(
             go.Scatter(
@@ -136,7 +143,8 @@ def _location(outcomes: Sequence[Outcome]) -> Section | None:
 
 
 def _concealed(outcome: Outcome) -> str:
-    return outcome.outside or " + ".join(outcome.effects) or "nothing"
+    named = [each for each in outcome.effects if each != "unknown"]
+    return " + ".join([*named, *([outcome.outside] if outcome.outside else [])]) or "nothing"
 
 
 def _row(outcome: Outcome) -> str:

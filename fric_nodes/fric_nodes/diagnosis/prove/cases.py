@@ -5,7 +5,8 @@ has not seen (:mod:`.reckoning`):
 
 - *moderate*: an NOE between 1 and 15 %, and at least 15 times the noise floor;
 - *weak*: an NOE of 3 to 5 times the noise floor, which itself is 0.02 to 0.07 %;
-- a *pair*: two effects, each of which is moderate when it is concealed alone on this axis and these recordings.
+- a *pair*: two effects, each of which is moderate when it is concealed alone on this axis and these recordings;
+- *mixed*: as a pair, of an effect and of physics outside the vocabulary, as real machines have both.
 
 Everything follows from the seed: the same seed gives the same recordings.
 """
@@ -34,10 +35,11 @@ from .structure import nominal_model, relative_errors, true_model
 
 __all__ = ["KINDS", "VARIANTS", "Case", "Order", "draw", "plan"]
 
-KINDS = ("moderate", "weak", "pair", "unknown", "nothing")
-VARIANTS = ("standard", "form", "half-rate", "double-rate")
+KINDS = ("moderate", "weak", "pair", "unknown", "nothing", "mixed")
+VARIANTS = ("standard", "form", "half-rate", "double-rate", "mixed")
 
 _SHARES = {"moderate": 0.32, "weak": 0.16, "pair": 0.16, "unknown": 0.15, "nothing": 0.21}
+_MIXED_SHARES = {"mixed": 0.5, "unknown": 0.5}  # what is found beside something unknown: rightly, and wrongly
 _RATE = {"half-rate": 0.5, "double-rate": 2.0}
 _MODERATE = (1.0, 15.0)
 _ATTEMPTS = 25
@@ -79,7 +81,7 @@ def plan(n_cases: int, seed: int, variant: str = "standard") -> list[Order]:
     if n_cases < 1:
         raise InputError("--cases", f"{n_cases} is too few", "ask for at least one case")
     random = np.random.default_rng([seed, VARIANTS.index(variant)])
-    counts = _counts(n_cases)
+    counts = _counts(n_cases, _MIXED_SHARES if variant == "mixed" else _SHARES)
     chosen: list[tuple[str, tuple[str, ...]]] = []
     for kind, count in counts.items():
         chosen += [(kind, names) for names in _names(kind, count, variant, random)]
@@ -88,9 +90,9 @@ def plan(n_cases: int, seed: int, variant: str = "standard") -> list[Order]:
     return [Order(k, seeds[k], chosen[at][0], chosen[at][1], variant) for k, at in enumerate(order)]
 
 
-def _counts(n_cases: int) -> dict[str, int]:
+def _counts(n_cases: int, shares: Mapping[str, float]) -> dict[str, int]:
     """Cases of each kind, by largest remainder."""
-    exact = {kind: share * n_cases for kind, share in _SHARES.items()}
+    exact = {kind: share * n_cases for kind, share in shares.items()}
     counts = {kind: int(value) for kind, value in exact.items()}
     for kind in sorted(exact, key=lambda each: counts[each] - exact[each])[: n_cases - sum(counts.values())]:
         counts[kind] += 1
@@ -111,6 +113,13 @@ def _names(kind: str, count: int, variant: str, random: np.random.Generator) -> 
         effects = _single_effects("standard")
         pairs = [(a, b) for k, a in enumerate(effects) for b in effects[k + 1 :] if not clash(CONCEALED[a], CONCEALED[b])]
         return [pairs[int(at)] for at in random.permutation(len(pairs))[:count]]
+    if kind == "mixed":
+        known, others = _balanced(_single_effects("standard"), count, random), _balanced(list(OUTSIDE), count, random)
+        # An axis can't need a part that it may not have.
+        return [
+            (a, b if not CONCEALED[a].needs & OUTSIDE[b].lacks else "floor_vibration")
+            for a, b in zip(known, others, strict=True)
+        ]
     return [(name,) for name in _balanced(_single_effects(variant), count, random)]
 
 
@@ -151,8 +160,7 @@ def make(order: Order) -> Case:
     Raises:
         InputError: no axis was found on which it has the strength wanted.
     """
-    known = OUTSIDE if order.kind == "unknown" else CONCEALED
-    for name in order.names:
+    for known, name in zip(_catalogues(order.kind), order.names, strict=False):
         if name not in known:
             raise InputError("draw", f"unknown effect '{name}'", f"use one of {', '.join(known)}")
     why = ""
@@ -163,6 +171,11 @@ def make(order: Order) -> Case:
             why = str(reason)
     names = " and ".join(order.names)
     raise InputError(f"case {order.seed}", f"no axis shows {names} with the strength wanted ({why})", "take another seed")
+
+
+def _catalogues(kind: str) -> tuple[Mapping[str, Concealed] | Mapping[str, Outside], ...]:
+    """Where the names of a case of this kind are found, one for each."""
+    return {"unknown": (OUTSIDE,), "mixed": (CONCEALED, OUTSIDE)}.get(kind, (CONCEALED, CONCEALED))
 
 
 def _code(order: Order) -> tuple[int, int]:
@@ -176,7 +189,7 @@ def _form(entry: Concealed, variant: str, random: np.random.Generator) -> int:
 
 def _attempt(order: Order, random: np.random.Generator) -> Case:
     entries: list[Concealed | Outside]
-    entries = [OUTSIDE[name] if order.kind == "unknown" else CONCEALED[name] for name in order.names]
+    entries = [known[name] for known, name in zip(_catalogues(order.kind), order.names, strict=False)]
     needs = frozenset[str]().union(*(each.needs for each in entries if isinstance(each, Concealed)))
     lacks = frozenset[str]().union(*(each.lacks for each in entries))
     setting = draw_setting(random, needs, lacks, _RATE.get(order.variant, 1.0))
@@ -231,7 +244,7 @@ def _solved(
     if kind == "weak":
         knob = turned(strength, 4.0, 1.2, largest)
     else:
-        low, high = (1.6, 7.0) if kind == "pair" else (1.4, 11.0)
+        low, high = (1.6, 7.0) if kind in ("pair", "mixed") else (1.4, 11.0)
         target = float(math.exp(random.uniform(math.log(low), math.log(high))))
         knob = turned(strength, target, 1.25, largest, enough=low)
     return knob, last[knob]
@@ -250,16 +263,17 @@ def _finished(
     }
     conditions = {name: value for name, value in conditions.items() if name in signals}
     exact, given = nominal_model(physics, bench.setting.parts, conditions, random)
-    concealed = () if order.kind == "unknown" else order.names
-    components = sorted(OUTSIDE[order.names[0]].components) if order.kind == "unknown" else []
+    outside = next((name for name in order.names if name in OUTSIDE), None) if order.kind in ("unknown", "mixed") else None
+    concealed = tuple(name for name in order.names if name != outside)
+    components = sorted(OUTSIDE[outside].components) if outside else []
     key = {
         "format": "fric-prove-key/1",
         "number": order.number,
         "seed": order.seed,
         "variant": order.variant,
         "kind": order.kind,
-        "effects": ["unknown"] if order.kind == "unknown" else list(order.names),
-        "physics_outside": order.names[0] if order.kind == "unknown" else None,
+        "effects": [*concealed, "unknown"] if outside else list(order.names),
+        "physics_outside": outside,
         "components": components,
         "forms": forms,
         "noe_alone": alone,
@@ -285,7 +299,7 @@ def _check(kind: str, noe: float, floor: float) -> None:
         raise Unreachable(f"the reckoning leaves {noe:.3g} % where nothing is concealed")
     if kind == "weak" and not 3.0 <= noe / floor <= 5.0:
         raise Unreachable(f"{noe / floor:.2g} times the floor")
-    if kind in ("moderate", "unknown", "pair") and noe < 15.0 * floor:
+    if kind in ("moderate", "unknown", "pair", "mixed") and noe < 15.0 * floor:
         raise Unreachable(f"only {noe / floor:.3g} times the floor")
     if kind in ("moderate", "unknown") and not _MODERATE[0] <= noe <= _MODERATE[1]:
         raise Unreachable(f"an NOE of {noe:.3g} %")

@@ -71,7 +71,7 @@ class Outcome:
     Attributes:
         number: of the case.
         kind: of the case.
-        effects: concealed; ``("unknown",)`` for physics outside the vocabulary, empty where nothing is missing.
+        effects: concealed; ``unknown`` among them for physics outside the vocabulary; empty where nothing is missing.
         outside: name of the physics outside the vocabulary, or empty.
         components: in which it sits.
         mismatch: whether the report sees a mismatch.
@@ -115,11 +115,11 @@ class Outcome:
 
     @property
     def right(self) -> bool:
-        """Whether that is what was concealed: both effects of a pair, the place too for physics outside the vocabulary."""
+        """Whether that is what was concealed: both of two; the place too where all is outside the vocabulary."""
         named = {each.effect for each in self.findings}
         if self.kind == "nothing":
             return self.said == "nothing"
-        if self.kind == "pair":
+        if self.kind in ("pair", "mixed"):
             return not self.failure and set(self.effects) <= named
         if self.kind == "unknown":
             return self.said == "unknown" and bool(self.findings) and self.findings[0].component in self.components
@@ -187,10 +187,8 @@ def outcome_of(key: Mapping[str, Any], folder: Path, noe_own: float | None) -> O
     spans = [(float(first), float(last)) for first, last in report.get("where", {}).get("time", ())]
     if spans and key["kind"] != "nothing":
         held, ratio = energy_held(np.array(key["energy"]), key["cell"], spans)
-    if key["kind"] == "unknown":
-        components = frozenset(key["components"])
-    else:
-        components = frozenset[str]().union(*(components_of(effect) for effect in key["effects"]))
+    components = frozenset(key["components"])
+    components = components.union(*(components_of(effect) for effect in key["effects"] if effect != "unknown"))
     validation = report.get("validation", {})
     return Outcome(
         number=key["number"],
@@ -269,7 +267,8 @@ def calibration_bins(pairs: Sequence[tuple[float, bool]]) -> tuple[tuple[float, 
 def scored(outcomes: Sequence[Outcome]) -> Score:
     """The score of these outcomes."""
     by_kind = {
-        kind: [each for each in outcomes if each.kind == kind] for kind in ("moderate", "weak", "pair", "unknown", "nothing")
+        kind: [each for each in outcomes if each.kind == kind]
+        for kind in ("moderate", "weak", "pair", "unknown", "nothing", "mixed")
     }
     rates: dict[str, Rate] = {}
     figures: list[Figure] = []
@@ -286,6 +285,10 @@ def scored(outcomes: Sequence[Outcome]) -> Score:
     rate("nothing missing, but something found (false alarms)", by_kind["nothing"], lambda o: not o.right, "<= 0.02")
     rate("outside the vocabulary, said to be unknown, at the right place", by_kind["unknown"], lambda o: o.right, ">= 0.9")
     rate("outside the vocabulary, said to be unknown", by_kind["unknown"], lambda o: o.said == "unknown")
+    mixed = by_kind["mixed"]
+    rate("an effect beside physics outside the vocabulary: the effect named", mixed, lambda o: _names(o, o.effects[0]))
+    rate("the same: said that something unknown is there", mixed, lambda o: _names(o, "unknown"))
+    rate("the same: something else named that is more than half sure", mixed, _sure_and_wrong)
     single = by_kind["moderate"] + by_kind["weak"]
     wrong = [each for each in single if not each.right]
     rate("wrong single effects whose runner-up is right", wrong, lambda o: o.runner_up_right)
@@ -304,10 +307,18 @@ def scored(outcomes: Sequence[Outcome]) -> Score:
     figures.append(Figure("time of a diagnosis, longest", max(o.seconds for o in outcomes), "s"))
     confusion: dict[tuple[str, str], int] = {}
     for each in outcomes:
-        if each.kind != "pair":
+        if each.kind not in ("pair", "mixed"):
             at = (each.effects[0] if each.effects else "nothing", each.said)
             confusion[at] = confusion.get(at, 0) + 1
     return Score(tuple(figures), rates, confusion, bins)
+
+
+def _names(outcome: Outcome, effect: str) -> bool:
+    return any(each.effect == effect for each in outcome.findings)
+
+
+def _sure_and_wrong(outcome: Outcome) -> bool:
+    return any(each.effect not in outcome.effects and each.confidence > 0.5 for each in outcome.findings)
 
 
 def _component_right(outcome: Outcome) -> bool:
