@@ -10,8 +10,9 @@ shows. Each term that comes then has to make the means held back better.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -62,8 +63,8 @@ def ladder_of(train: Sequence[Record], validation: Sequence[Record], nominal: Mo
         return None
     means, notes = settled_means(train, Options())
     held, others = settled_means(validation, Options())
-    settled = len({mean.source for mean in (*means, *held)})
-    if settled < _SETTLED * len({record.source for record in (*train, *validation)}) or not held:
+    several = any(len({mean.source for mean in each}) < len(each) for each in (means, held))
+    if several or not held or len(means) + len(held) < _SETTLED * (len(train) + len(validation)):
         return None
     points = _points(means) if means else None
     if points is None or points.n_speeds < _FEWEST_SPEEDS or np.all(points.velocity > 0.0) or np.all(points.velocity < 0.0):
@@ -94,10 +95,17 @@ def _terms(candidate: Candidate, base: Candidate) -> list[str]:
 
 
 def _without(candidate: Candidate, effect: str) -> Candidate:
-    if effect == "stribeck":
-        return replace(candidate, stribeck="")
-    flags = {"viscous": candidate.viscous, "quadratic": candidate.quadratic, "asymmetry": candidate.asymmetry}
-    return Candidate(stribeck=candidate.stribeck, **{**flags, _FLAGS[effect]: False})
+    return _with(candidate, effect, Candidate())
+
+
+def _with(candidate: Candidate, effect: str, other: Candidate) -> Candidate:
+    """``candidate`` with or without one effect, as ``other`` has it or not."""
+    return Candidate(
+        other.viscous if effect == "viscous" else candidate.viscous,
+        other.stribeck if effect == "stribeck" else candidate.stribeck,
+        other.quadratic if effect == "quadratic_drag" else candidate.quadratic,
+        other.asymmetry if effect == "asymmetry" else candidate.asymmetry,
+    )
 
 
 def _refitted(candidate: Candidate, points: Points, scatter: float) -> Curve:
@@ -195,7 +203,7 @@ def _where(
         for high in levels[k:].tolist()
         if float(np.sum(energy[(speed >= low) & (speed <= high)])) >= _ENERGY * total
     ]
-    _, low, high = min(ranges)
+    _, low, high = min(ranges, default=(0.0, float(levels[0]), float(levels[-1])))
     inside: Mask = (speed >= low) & (speed <= high)
     ahead = float(np.sum(energy[np.array([mean.velocity > 0.0 for mean in means])])) / total
     way = "forward only" if ahead > 0.85 else ("backward only" if ahead < 0.15 else "both directions")
@@ -204,6 +212,39 @@ def _where(
     words = f"|v| < {high:.3g} {unit}/s" if low == levels[0] else f"|v| from {low:.3g} to {high:.3g} {unit}/s"
     share = float(np.sum(energy[inside])) / total
     return Where(time, share, f"{words}, {way}", "speed", (low, high), float(np.mean(inside)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """The curves, and the means held back as they see them.
+
+    Attributes:
+        choice: of the curve.
+        base: the nominal model's terms.
+        best: the curve that the means held back don't speak against.
+        start: the nominal model's terms, refitted.
+        points: the means learnt from.
+        apart: those held back.
+        place: tells where an energy, one value per mean held back, sits.
+    """
+
+    choice: Choice
+    base: Candidate
+    best: Curve
+    start: Curve
+    points: Points
+    apart: Points
+    place: Callable[[Array], Where]
+
+    @property
+    def excess(self) -> float:
+        """Weighted squares by which the means learnt from miss the refitted curve, above what chance leaves."""
+        return max(self.start.cost - self.best.freedom, 1e-300)
+
+    @property
+    def left(self) -> Array:
+        """What the best curve leaves of the means held back [F], shape ``(n,)``."""
+        return self.apart.force - self.best.force(self.apart.velocity)
 
 
 def concluded_by_means(
@@ -219,58 +260,25 @@ def concluded_by_means(
     choice = choose(points, at_least=base)
     best, gone = _kept(choice, base, points, apart)
     start = _refitted(base, points, best.scatter)
-    shown = _model(nominal, best, choice)
-    refit = _model(nominal, start, choice)
-    units = nominal.units
     order = [record.source for record in validation]
     spans = {record.source: (float(record.time[record.mask][0]), float(record.time[record.mask][-1])) for record in validation}
+    judged = _Judged(
+        choice,
+        base,
+        best,
+        start,
+        points,
+        apart,
+        partial(_where, means=ladder.validation, spans=spans, order=order, unit=nominal.units.position),
+    )
     force = {
         "nominal": _static(nominal, apart.velocity),
         "refit": start.force(apart.velocity),
         "augmented": best.force(apart.velocity),
     }
-    spread = max(float(np.sum((apart.force - np.mean(apart.force)) ** 2)), 1e-300)
-    noe = {name: 100.0 * float(np.sum((apart.force - each) ** 2)) / spread for name, each in force.items()}
-    floor = float(np.sum(apart.error**2))
-    scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], 100.0 * floor / spread)
-    missing = max(noe["refit"] * spread / 100.0 - floor, 1e-300)
-    rest = min(max(noe["augmented"] * spread / 100.0 - floor, 0.0) / missing, 1.0)
-    excess = max(start.cost - best.freedom, 1e-300)
-    findings, grown = [], [Grown("", 1.0, "")]
-    for effect in sorted(_terms(best.candidate, base), key=lambda name: _gain(name, best, points), reverse=True):
-        poorer = _refitted(_without(best.candidate, effect), points, best.scatter)
-        gain = max(poorer.cost - best.cost, 0.0)
-        own = _of_term(effect, best, apart.velocity) ** 2
-        sure = round(min(_sure(choice, effect), _MOST), 4)
-        held = next(held for held in shown.terms if held.effect.id == effect)
-        tested = f" (by chance in {100.0 * choice.p_value:.2g} % of recordings at most)" if effect == "stribeck" else ""
-        evidence = (
-            f"{held.effect.title} takes {100.0 * min(gain / excess, 1.0):.3g} % of the weighted squares away by which the "
-            f"means of {len(ladder.train)} runs miss the refitted curve{tested}, and brings the {len(ladder.validation)} "
-            "held back nearer"
-        )
-        findings.append(
-            Finding(
-                effect=effect,
-                law=held.effect.law,
-                title=held.effect.title,
-                confidence=sure,
-                runner_up=_rival(choice, base, best.candidate, effect),
-                where=_where(own, ladder.validation, spans, order, units.position),
-                component=place_of(held.effect),
-                share=min(gain / excess, 1.0),
-                evidence=evidence,
-                parameters={
-                    p.name: Estimate(p.value, shown.standard_errors.get(p.name), p.declaration.unit(units))
-                    for p in shown.parameters()
-                    if p.name.startswith(f"{effect}.")
-                },
-                noe_before=scored.noe_refit,
-                noe_after=scored.noe_augmented,
-            )
-        )
-        grown.append(Grown(effect, max(best.cost - best.freedom, 0.0) / excess, ""))
-    left = apart.force - best.force(apart.velocity)
+    scored, rest = _scored(apart, force)
+    shown, refit = _model(nominal, best, choice), _model(nominal, start, choice)
+    findings = _findings(judged, shown, scored)
     notes = [
         *corrected,
         "every recording is at one speed: the means of the runs were compared, not their samples",
@@ -278,33 +286,27 @@ def concluded_by_means(
     ]
     if best.scatter > 2.0 * float(np.median(points.error)):
         notes.append(
-            f"the means scatter by {best.scatter:.2g} {units.force} from run to run, beyond their own errors of "
-            f"{float(np.median(points.error)):.2g} {units.force}: temperature, lubricant or the place, "
+            f"the means scatter by {best.scatter:.2g} {nominal.units.force} from run to run, beyond their own errors of "
+            f"{float(np.median(points.error)):.2g} {nominal.units.force}: temperature, lubricant or the place, "
             "which constant speeds don't tell"
         )
     why = _structured(points, points.force - best.force(points.velocity))
     if why:
-        why = (
-            f"{why}, which chance does in less than one of a hundred: friction depends on speed in a way that no curve here has"
-        )
+        why += ", which chance does in less than one of a hundred: friction depends on speed in a way that no curve here has"
     if why and rest <= _UNEXPLAINED:
         notes.append(f"of the {100.0 * rest:.2g} % that stay, {why}")
         why = ""
     elif not why and findings and all(each.confidence < _AS_LIKELY for each in findings):
         why = "several curves bring the means nearer, and none of them surely: more speeds would tell"
     if why:
-        nobody = _unknown(
-            why, _where(np.maximum(left**2, 1e-300), ladder.validation, spans, order, units.position), scored, rest
-        )
+        nobody = _unknown(why, judged.place(judged.left**2), scored, rest)
         found = [replace(each, confidence=min(each.confidence, round(1.0 - nobody.confidence, 4))) for each in findings]
         findings = [nobody, *found]
-    everything = None
+    everything = remains = None
     if findings:
-        energy = (best.force(apart.velocity) - start.force(apart.velocity)) ** 2 + np.maximum(left**2 - apart.error**2, 0.0)
-        everything = _where(energy, ladder.validation, spans, order, units.position)
-    remains = None
-    if rest > _UNEXPLAINED:
-        remains = _where(np.maximum(left**2, 1e-300), ladder.validation, spans, order, units.position)
+        energy = (force["augmented"] - force["refit"]) ** 2 + np.maximum(judged.left**2 - apart.error**2, 0.0)
+        everything = judged.place(energy)
+        remains = judged.place(judged.left**2) if rest > _UNEXPLAINED else None
     return Diagnosis(
         mismatch=bool(findings),
         where=everything,
@@ -313,7 +315,7 @@ def concluded_by_means(
         findings=tuple(findings),
         rejected=_rejected(choice, base, best, gone),
         validation=scored,
-        unexplained=Unexplained(rest, remains),
+        unexplained=Unexplained(rest if findings else 0.0, remains),
         next_experiment="record speeds that change (a chirp, reversals): constant ones don't show what acts at reversals, with "
         "the acceleration or at a place",
         model=shown,
@@ -322,9 +324,65 @@ def concluded_by_means(
         prediction=tuple(_predictions(validation, ladder.validation, force)),
         notes=tuple(notes),
         bandwidth=0.0,
-        grown=tuple(grown),
+        grown=(Grown("", 1.0, ""), *_grown(judged, findings)),
         by_means=True,
     )
+
+
+def _scored(apart: Points, force: Mapping[str, Array]) -> tuple[Validation, float]:
+    """NOE of the means held back, and the share that stays of what is missing beyond their own errors."""
+    spread = max(float(np.sum((apart.force - np.mean(apart.force)) ** 2)), 1e-300)
+    left = {name: float(np.sum((apart.force - each) ** 2)) for name, each in force.items()}
+    floor = float(np.sum(apart.error**2))
+    noe = {name: 100.0 * each / spread for name, each in left.items()}
+    rest = min(max(left["augmented"] - floor, 0.0) / max(left["refit"] - floor, 1e-300), 1.0)
+    return Validation(noe["nominal"], noe["refit"], noe["augmented"], 100.0 * floor / spread), rest
+
+
+def _findings(judged: _Judged, shown: Model, scored: Validation) -> list[Finding]:
+    """Each term that came, what explains most first."""
+    best, choice = judged.best, judged.choice
+    gain = {name: _gain(name, best, judged.points) for name in _terms(best.candidate, judged.base)}
+    found = []
+    for effect in sorted(gain, key=lambda name: -gain[name]):
+        held = next(held for held in shown.terms if held.effect.id == effect)
+        share = min(max(gain[effect], 0.0) / judged.excess, 1.0)
+        tested = f" (by chance in {100.0 * choice.p_value:.2g} % of recordings at most)" if effect == "stribeck" else ""
+        evidence = (
+            f"{held.effect.title} takes {100.0 * share:.3g} % of the weighted squares away by which the means of "
+            f"{judged.points.force.size} runs miss the refitted curve{tested}, and brings the {judged.apart.force.size} "
+            "held back nearer"
+        )
+        found.append(
+            Finding(
+                effect=effect,
+                law=held.effect.law,
+                title=held.effect.title,
+                confidence=round(min(_sure(choice, effect), _MOST), 4),
+                runner_up=_rival(choice, judged.base, best.candidate, effect),
+                where=judged.place(_of_term(effect, best, judged.apart.velocity) ** 2),
+                component=place_of(held.effect),
+                share=share,
+                evidence=evidence,
+                parameters={
+                    p.name: Estimate(p.value, shown.standard_errors.get(p.name), p.declaration.unit(shown.units))
+                    for p in shown.parameters()
+                    if p.name.startswith(f"{effect}.")
+                },
+                noe_before=scored.noe_refit,
+                noe_after=scored.noe_augmented,
+            )
+        )
+    return found
+
+
+def _grown(judged: _Judged, findings: Sequence[Finding]) -> Iterator[Grown]:
+    """What stays of the missing squares as one term after the other comes, what explains most first."""
+    candidate = judged.base
+    for effect in (each.effect for each in findings if each.effect in _FLAGS):
+        candidate = _with(candidate, effect, judged.best.candidate)
+        curve = _refitted(candidate, judged.points, judged.best.scatter)
+        yield Grown(effect, max(curve.cost - judged.best.freedom, 0.0) / judged.excess, "")
 
 
 def _gain(effect: str, best: Curve, points: Points) -> float:
