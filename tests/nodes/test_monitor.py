@@ -157,6 +157,7 @@ def test_what_is_switched_on_is_raised_within_five_seconds_and_named(
 def test_half_an_hour_in_which_nothing_changes_is_silent(machine: Any) -> None:
     rig = machine(name_component=False)
     rig.start()
+    rig.until(lambda: rig.monitor.watch.phase is Phase.WATCHING, "the floor is learnt")
     rig.until(lambda: rig.time() > 1800.0, "half an hour of the machine's time", 2300.0)
     assert rig.mismatches == []
     assert rig.monitor.watch.phase is Phase.WATCHING
