@@ -59,6 +59,23 @@ def test_what_other_effects_stand_in_for_is_named_alone(effect: str, seed: int) 
     assert found.validation.noe_augmented < 0.1 * found.validation.noe_refit
 
 
+@pytest.mark.parametrize(
+    ("effects", "seed"),
+    [
+        # Friction that falls while slowing down explains it to a thousandth, on an axis of a quarter of the mass.
+        (("viscous", "saturation"), 2114983913),
+        # So do an appendage and the same hysteresis together, on an axis of less than half the mass.
+        pytest.param(("temperature", "stiffness"), 1816859273, marks=pytest.mark.long),
+    ],
+    ids=["a quarter of the mass", "half of the mass"],
+)
+def test_what_explains_all_on_an_axis_of_another_mass_is_no_explanation(effects: tuple[str, str], seed: int) -> None:
+    case = draw(seed, "pair", effects, "form")
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert found.findings[0].effect == "unknown"
+    assert all(each.confidence < 0.2 for each in found.findings[1:])
+
+
 def test_concealed_bristles_are_named_and_located(presliding: tuple[object, Diagnosis]) -> None:
     _, found = presliding
     assert [each.effect for each in found.findings] == ["presliding"]

@@ -58,6 +58,7 @@ _AS_LIKELY = 0.5  # to be right as to be wrong
 _FIRST_FIT = 6  # iterations, by which starts are compared
 _STANDS_OUT = 10.0  # times the floor
 _LOCATING = 600.0  # [rad/s], for spans of time
+_LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of the physics
 _LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that moves the body
 
 
@@ -188,7 +189,12 @@ def _started(nominal: Model, train: Sequence[Record]) -> tuple[list[Track], Mode
     tracks = _tracks(train, starts[0])
     bounds = bounds_of(starts[0], scales_of(tracks[0]))
     fits = [tracks[0].fit(start, free_names(start), _FIRST_FIT, bounds) for start in starts]
-    return tracks, min(fits, key=lambda fit: float(fit.residual @ fit.residual)).model
+    best = min(fits, key=lambda fit: float(fit.residual @ fit.residual))
+    lacks = float(best.residual @ best.residual) / max(_spread(tracks[0]), 1e-300)
+    if lacks > _LACKS_MUCH and not nominal.plant.led and mass_off(tracks[0].mass, nominal) > FAR_OFF:
+        # Where so much is missing that it makes up a mass of its own, the one given is the better measure.
+        tracks = [replace(track, mass=nominal.total_inertia) for track in tracks]
+    return tracks, best.model
 
 
 def _tracks(train: Sequence[Record], start: Model) -> list[Track]:

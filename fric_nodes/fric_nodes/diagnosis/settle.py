@@ -22,6 +22,8 @@ _TO_STAY = 0.004  # of what is missing at the start, beside all other terms
 _AUDITED = 0.04  # of what is missing: with more left, it is looked at whether halves of the recordings tell the parameters
 FLOOR_KNOWN = 0.1  # of itself, how well a floor is known
 _TWINS = 2
+_COMPARABLE = 0.5  # of what a term explains, for a rival to take its place, however plausible that is
+_WORSE = "made what it was not fitted to worse"
 _HOPELESS = 0.5  # of what is missing: with more left, no exchange of a term makes an explanation
 
 
@@ -70,11 +72,21 @@ class Settled:
 
 
 def settled(track: Track, begin: State, state: State, steps: list[Step]) -> Settled:
-    """Take away what isn't needed of the terms that ``steps`` brought, and audit the rest."""
+    """Take away what isn't needed of the terms that ``steps`` brought, and audit the rest.
+
+    What did the work of the others where it was fitted, and makes worse what it was not fitted to, goes in their place.
+    """
     begin = refit(track, begin.fit.model, max_iterations=6)
-    state, steps, gone = _pruned(track, begin, state, steps)
-    rest = audit(track, begin.fit.model, state.fit.model) if steps else 1.0
-    return _unless_worse(Settled(begin, state, tuple(steps), rest, tuple(gone)))
+    pruned, kept, gone = _pruned(track, begin, state, steps)
+    rest = audit(track, begin.fit.model, pruned.fit.model) if kept else 1.0
+    back = [step for step in steps if step not in kept]
+    if rest > 1.0 and back:
+        culprits = {step.term.split("#")[0] for step in kept}
+        honest = [held for held in state.fit.model.terms if held.effect.id not in culprits]
+        done = settled(track, begin, refit(track, state.fit.model.with_terms(honest)), back)
+        worse = [(step.term.split("#")[0], _WORSE) for step in kept]
+        return replace(done, gone=(*worse, *done.gone))
+    return _unless_worse(Settled(begin, pruned, tuple(kept), rest, tuple(gone)))
 
 
 def exchanged(track: Track, done: Settled) -> Settled:
@@ -91,7 +103,7 @@ def _unless_worse(done: Settled) -> Settled:
     """``done``, or nothing grown where that made worse what it was not fitted to."""
     if done.rest <= 1.0:
         return done
-    gone = [(step.term, "made what it was not fitted to worse") for step in done.steps]
+    gone = [(step.term, _WORSE) for step in done.steps]
     return Settled(done.begin, done.begin, (), 1.0, (*done.gone, *gone))
 
 
@@ -159,6 +171,19 @@ def _price(track: Track, model: Model, name: str, excess: float) -> float:
     return price_of(effect, excess) + excess * implausible(track.mass, model)
 
 
+def _takes_its_place(track: Track, begin: State, without: State, state: State, own: float, rival: Rival) -> bool:
+    """Whether ``rival`` explains more than the term that it would replace, which scores ``own``; see :class:`Rival`.
+
+    However plausible it is, it must explain something like as much; and an axis of another mass speaks against it by all that
+    is missing, not only by what this term has of it.
+    """
+    if without.left - rival.left < _COMPARABLE * (without.left - state.left):
+        return False
+    dearer = implausible(track.mass, rival.fit.model) - implausible(track.mass, state.fit.model)
+    more = max(dearer, 0.0) * max(begin.excess - without.excess, 0.0)
+    return own - rival.score - more > max(OF_FLOOR * state.floor, _TO_STAY * without.excess)
+
+
 def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scales: Scales) -> tuple[State, list[Step]]:
     """Each term against its rivals with all the others there: what came first was chosen while the others were missing."""
     for k, step in enumerate(list(steps)):
@@ -170,7 +195,7 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance, in_pairs=False)
         rivals = [rival for rival in rivals_of(track, without, found, scales, state.left) if rival.effect.id != effect_id]
         own = state.left + _price(track, state.fit.model, step.term, without.excess)
-        if rivals and own - rivals[0].score > max(OF_FLOOR * state.floor, _TO_STAY * without.excess):
+        if rivals and _takes_its_place(track, begin, without, state, own, rivals[0]):
             state = refit(track, rivals[0].fit.model, max_iterations=6)
             term, rivals = rivals[0].names[0], rivals[1:]
         else:
@@ -205,7 +230,9 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
                 continue
             without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
             nothing = _is_nothing(next(each for each in state.fit.model.terms if each.effect.id == effect_id))
-            lost = without.left - state.left
+            # What leaves an axis of another mass behind has only changed what stands in for what.
+            dearer = implausible(track.mass, without.fit.model) - implausible(track.mass, state.fit.model)
+            lost = without.left - state.left + begin.excess * max(dearer, 0.0)
             if nothing or lost < max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
                 why = "comes out at nothing" if nothing else "not needed any more"
                 left_out.append((-math.inf if nothing else lost, without, step, f"{why} beside the other terms"))
