@@ -24,6 +24,7 @@ from .track import Track
 __all__ = ["Growth", "grow"]
 
 _TO_COMPARE = 2  # terms, after which another beginning is tried
+_OTHER_BEGINNINGS = 2
 _AGAIN = 0.05  # where nothing more helps and more is left of what is missing,
 _AGAIN_FOR_MORE = 0.01  # or more than that, and more terms would come
 _MOST_TERMS = 4
@@ -114,17 +115,24 @@ def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], 
 
 
 def _compared(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None]) -> Growth:
-    """``start`` and its first terms: from what explains most alone, or from the next best, if that comes further.
+    """``start`` and its first terms: from what explains most alone, or from one of the next best, if that comes further.
 
-    What does the work of two effects at once explains more than either, and stays in the way of both.
+    What does the work of two effects at once explains more than either, and stays in the way of both; and what explains it on
+    an axis of another mass hasn't explained it.
     """
     first = _added(tracks, start, None, tell, most=_TO_COMPARE)
-    other = next((each for each in first.beginnings if each.effect.id != first.steps[0].term.split("#")[0]), None)
-    if other is None or _lacks(first) < (_AGAIN if first.ended else _AGAIN_FOR_MORE):
-        return first
-    tell(f"once more, from {' and '.join(other.names)}")
-    second = _added(tracks, start, other, tell, most=_TO_COMPARE)
-    return min(first, second, key=lambda each: _lacks(each) + each.dear)
+    tried, begun = [first], {step.term.split("#")[0] for step in first.steps[:1]}
+    for other in first.beginnings:
+        best = min(tried, key=lambda each: _lacks(each) + each.dear)
+        lacks = _lacks(best) + implausible(best.track.mass, best.end.fit.model)
+        if len(tried) > _OTHER_BEGINNINGS or lacks < (_AGAIN if best.ended else _AGAIN_FOR_MORE):
+            break
+        if other.effect.id in begun:
+            continue
+        begun.add(other.effect.id)
+        tell(f"once more, from {' and '.join(other.names)}")
+        tried.append(_added(tracks, start, other, tell, most=_TO_COMPARE))
+    return min(tried, key=lambda each: _lacks(each) + each.dear)
 
 
 def _lacks(growth: Growth) -> float:
