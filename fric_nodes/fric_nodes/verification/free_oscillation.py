@@ -27,13 +27,13 @@ from .verification import Evidence, Verification
 __all__ = ["VERIFICATION", "errors"]
 
 _START = 1.5  # [rad]
-_SEEDS = {"log-decrement": 100, "hilbert": 40, "wavelet": 40}
+_SEEDS = 100
 _METHODS: dict[str, Callable[[Oscillation], FreeOscillation]] = {
     "log-decrement": log_decrement,
     "hilbert": hilbert,
     "wavelet": wavelet_ridge,
 }
-_GOALS = ("<= 0.3", "<= 2", "", "<= 0.2", "<= 0.5")  # [%]
+_GOALS = ("<= 0.3", "<= 2", "<= 2", "<= 0.2", "<= 0.5")  # [%]
 _SYMBOLS = ("omega_0", "zeta", "difference of zeta", "x_k", "difference of x_k")
 _NINETY = 1.6449
 # What the thesis prints as estimated, beside measured.
@@ -159,7 +159,7 @@ def _plots(found: dict[str, dict[str, tuple[list[FreeOscillation], Array]]]) -> 
 
 
 def _run() -> Evidence:
-    found = {method: errors(method, seeds) for method, seeds in _SEEDS.items()}
+    found = {method: errors(method, _SEEDS) for method in _METHODS}
     figures, notes = [], []
     for method, pairs in found.items():
         more, line = _method_figures(method, pairs)
