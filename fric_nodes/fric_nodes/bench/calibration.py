@@ -5,13 +5,12 @@ What is recorded and how it is counted: :mod:`fric_nodes.identification.calibrat
 
 from __future__ import annotations
 
-import numpy as np
-
-from ..identification.calibration import AXES, Calibration, calibrate
+from ..identification.calibration import AXES, calibrate
 from ..identification.result import Options
 from .benchmark import Benchmark, Figure
+from .trials import figures_of
 
-__all__ = ["BENCHMARK", "CASES", "figures_of"]
+__all__ = ["BENCHMARK", "CASES"]
 
 # None of these recordings was looked at while the methods were made.
 _SEEDS = range(10_000, 10_200)
@@ -37,31 +36,13 @@ KINDS = {
 """Axis, method and kind of interval of each case; these intervals take a hundred fits each, so that fewer are counted."""
 
 
-def figures_of(name: str, found: Calibration) -> list[Figure]:
-    """Coverage, and mean error over standard error, of each parameter."""
-    figures = []
-    for parameter, covered, bias in zip(found.names, found.coverage(0.9).tolist(), found.bias.tolist(), strict=True):
-        figures += [
-            Figure(f"{name}: {parameter}, 90 % intervals that hold the truth", covered, "1", ">= 0.85"),
-            Figure(f"{name}: {parameter}, the same", covered, "1", "<= 0.95"),
-            Figure(f"{name}: {parameter}, mean error over standard error", bias, "1"),
-        ]
-    return figures
-
-
 def run() -> list[Figure]:
     """Coverage and bias per method and parameter."""
     figures: list[Figure] = []
     for name, (axis, method, options) in CASES.items():
         figures += figures_of(name, calibrate(AXES[axis], method, _SEEDS, options, _PROCESSES))
     for name, (axis, method, kind) in KINDS.items():
-        found = calibrate(AXES[axis], method, _FEWER, Options(), _PROCESSES, kind)
-        # Forty recordings tell a share to within 0.05: a single parameter says too little to be held to the limits.
-        share = float(np.mean(found.coverage(0.9)))
-        figures += [
-            Figure(f"{name}: 90 % intervals that hold the truth, all parameters", share, "1", ">= 0.85"),
-            Figure(f"{name}: the same", share, "1", "<= 0.95"),
-        ]
+        figures += figures_of(name, calibrate(AXES[axis], method, _FEWER, Options(), _PROCESSES, kind))
     return figures
 
 
