@@ -11,7 +11,13 @@ import math
 
 from .settle import Step
 
-__all__ = ["confidence_of", "margin_of", "unknown_confidence"]
+__all__ = ["AS_LIKELY", "UNEXPLAINED", "confidence_of", "margin_of", "unknown_confidence"]
+
+AS_LIKELY = 0.5
+"""Confidence below which a finding is more likely wrong than right."""
+
+UNEXPLAINED = 0.15
+"""Share of what was missing beyond which, where it stays, something unknown remains."""
 
 _OFFSET, _BY_RIVAL, _BY_REST = 0.9, 1.58, -14.1
 _MOST = 0.995

@@ -29,7 +29,7 @@ from ..threads import linear_algebra_in_one
 from .blocks import one_sided
 from .candidates import Scales, candidates, place_of, scales_of
 from .component import Signature, signatures
-from .confidence import confidence_of, unknown_confidence
+from .confidence import AS_LIKELY, UNEXPLAINED, confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, free_names, refit
 from .grow import Growth, grow
@@ -49,12 +49,10 @@ _FAST = 1.0  # largest product of bandwidth and sample time
 _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
 _KEPT = 0.4  # of what a grown model took off where it was fitted, to be found on the recordings held back
-_UNEXPLAINED = 0.15  # of what was missing: with more left, something unknown remains
 _FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is missing is known the worse
 _MANY = 3  # effects at once that still leave something are more likely to have stood in for one
 _SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, something unknown remains however little is known of the floor
-_AS_LIKELY = 0.5  # to be right as to be wrong
 _FIRST_FIT = 6  # iterations, by which starts are compared
 _STANDS_OUT = 10.0  # times the floor
 _LOCATING = 600.0  # [rad/s], for spans of time
@@ -253,12 +251,12 @@ def _concluded(
     # What needs a mass twice or half as large as the given one is no explanation.
     far_off = min(mass_off(mass, end) for mass in (track.mass, nominal.total_inertia)) > FAR_OFF
     # What is more likely wrong than right is no explanation either.
-    doubtful = all(each.confidence < _AS_LIKELY for each in findings)
+    doubtful = all(each.confidence < AS_LIKELY for each in findings)
     if missing and (rest > _SIGNED or doubtful or far_off or growth.beyond > 0.0):
         likely, of_all = _signature_of(tracks, growth, rest)
         # Where one signature explains more than several effects do together, these have only stood in for it.
         stand_in = of_all and len(findings) > 1
-    most = _UNEXPLAINED if len(findings) < _MANY else _SIGNED
+    most = UNEXPLAINED if len(findings) < _MANY else _SIGNED
     unsure = _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300)
     unknown = missing and (rest > min(most + unsure, _HARDLY) or doubtful or stand_in or far_off or growth.beyond > 0.0)
     unexplained = Unexplained(max(rest, growth.beyond), None)

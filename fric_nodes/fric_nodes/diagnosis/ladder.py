@@ -26,8 +26,8 @@ from ..instrument import Finding as Check
 from ..model import Model, Term
 from ..record import Array, Mask, Record
 from .candidates import place_of
-from .confidence import unknown_confidence
-from .locate import Where
+from .confidence import AS_LIKELY, UNEXPLAINED, unknown_confidence
+from .locate import Where, direction
 from .result import Diagnosis, Estimate, Finding, Grown, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
 
 __all__ = ["Ladder", "concluded_by_means", "ladder_of"]
@@ -39,9 +39,7 @@ _ENERGY = 0.8  # of what is missing, by the range of speeds named
 _DRAWS = 1999
 _SIGNIFICANT = 0.01
 _MOST = 0.99  # sure of anything
-_AS_LIKELY = 0.5  # to be right as to be wrong
 _SAME_SPEED = 0.1
-_UNEXPLAINED = 0.15  # of what is missing
 _FLAGS = {"viscous": "viscous", "stribeck": "stribeck", "quadratic_drag": "quadratic", "asymmetry": "asymmetry"}
 
 
@@ -206,12 +204,11 @@ def _where(
     _, low, high = min(ranges, default=(0.0, float(levels[0]), float(levels[-1])))
     inside: Mask = (speed >= low) & (speed <= high)
     ahead = float(np.sum(energy[np.array([mean.velocity > 0.0 for mean in means])])) / total
-    way = "forward only" if ahead > 0.85 else ("backward only" if ahead < 0.15 else "both directions")
     named = {mean.source for mean, within in zip(means, inside, strict=True) if within}
     time = tuple((spans[source],) if source in named and source in spans else () for source in order)
     words = f"|v| < {high:.3g} {unit}/s" if low == levels[0] else f"|v| from {low:.3g} to {high:.3g} {unit}/s"
     share = float(np.sum(energy[inside])) / total
-    return Where(time, share, f"{words}, {way}", "speed", (low, high), float(np.mean(inside)))
+    return Where(time, share, f"{words}, {direction(ahead)}", "speed", (low, high), float(np.mean(inside)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,10 +290,10 @@ def concluded_by_means(
     why = _structured(points, points.force - best.force(points.velocity))
     if why:
         why += ", which chance does in less than one of a hundred: friction depends on speed in a way that no curve here has"
-    if why and rest <= _UNEXPLAINED:
+    if why and rest <= UNEXPLAINED:
         notes.append(f"of the {100.0 * rest:.2g} % that stay, {why}")
         why = ""
-    elif not why and findings and all(each.confidence < _AS_LIKELY for each in findings):
+    elif not why and findings and all(each.confidence < AS_LIKELY for each in findings):
         why = "several curves bring the means nearer, and none of them surely: more speeds would tell"
     if why:
         nobody = _unknown(why, judged.place(judged.left**2), scored, rest)
@@ -306,7 +303,7 @@ def concluded_by_means(
     if findings:
         energy = (force["augmented"] - force["refit"]) ** 2 + np.maximum(judged.left**2 - apart.error**2, 0.0)
         everything = judged.place(energy)
-        remains = judged.place(judged.left**2) if rest > _UNEXPLAINED else None
+        remains = judged.place(judged.left**2) if rest > UNEXPLAINED else None
     return Diagnosis(
         mismatch=bool(findings),
         where=everything,

@@ -20,14 +20,14 @@ from ..record import Array
 from .candidates import Scales
 from .track import Track, smooth
 
-__all__ = ["Where", "locate"]
+__all__ = ["Where", "direction", "locate"]
 
 _CELL = 0.01  # [s]
 _HELD = 0.97  # of the energy, by the spans of time: of the true one they hold less than of the one that is seen
 _GAP = 2.5  # cells between two spans that are closed
 _RANGE = 0.8  # of the energy, by the range of a quantity
 _EVEN = 0.65  # share of the time from which on a range says nothing
-_ONE_WAY = 0.85
+_ONE_WAY = 0.85  # of the energy, for a mismatch of one direction
 
 
 @dataclass(frozen=True)
@@ -58,12 +58,17 @@ def locate(track: Track, energy: Sequence[Array], scales: Scales, model: Model) 
     everything = np.concatenate(list(energy))
     velocity = np.concatenate([_velocity(track, k) for k in range(len(track.runs))])
     forward = float(np.sum(everything[velocity > 0.0])) / max(float(np.sum(everything)), 1e-300)
-    way = "forward only" if forward > _ONE_WAY else ("backward only" if forward < 1.0 - _ONE_WAY else "both directions")
+    way = direction(forward)
     best = min(found, key=lambda each: each[3], default=None)
     if best is None or best[3] > _EVEN:
         return Where(spans, share, f"everywhere, {way}", "", (-math.inf, math.inf), 1.0)
     name, low, high, part = best
     return Where(spans, share, f"{_words(name, low, high, scales, model)}, {way}", name, (low, high), part)
+
+
+def direction(forward: float) -> str:
+    """In which direction a mismatch shows of which the share ``forward`` is there where the axis moves forward."""
+    return "forward only" if forward > _ONE_WAY else ("backward only" if forward < 1.0 - _ONE_WAY else "both directions")
 
 
 def _spans(track: Track, energy: Sequence[Array]) -> tuple[tuple[tuple[tuple[float, float], ...], ...], float]:
