@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
-from io import StringIO
-from pathlib import Path
+from functools import lru_cache, partial
 from typing import Annotated, Any, Literal, Union
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
-from ruamel.yaml import YAML
+from pydantic import BaseModel, Field, create_model
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import YAMLError
 
 from .effects import EFFECTS, by_name
 from .files import write_text
@@ -24,22 +20,15 @@ from .model import Model, ModelError, Term, build_model
 from .parameter import Parameter
 from .plants import PLANTS
 from .record import Units
+from .text_form import STRICT, UnitsEntry, dumped, line_of, loaded, text_of, units_entry, validated
 
 __all__ = ["FORMAT", "json_schema", "model_from_text", "model_to_text", "read_model", "write_model"]
 
 FORMAT = "fric-model/1"
 
-_STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class _UnitsEntry(BaseModel):
-    model_config = _STRICT
-    position: Literal["m", "rad"]
-    force: str = Field(min_length=1)
-
 
 class _NominalEntry(BaseModel):
-    model_config = _STRICT
+    model_config = STRICT
     normal_load: Annotated[float, Field(gt=0)] | None = None
     temperature: float | None = None
 
@@ -47,10 +36,10 @@ class _NominalEntry(BaseModel):
 class _Header(BaseModel):
     """Everything of a file but the parts that depend on the plant and the effects."""
 
-    model_config = _STRICT
+    model_config = STRICT
     format: Literal["fric-model/1"]
     joint: str = Field(min_length=1)
-    units: _UnitsEntry
+    units: UnitsEntry
     plant: dict[str, Any]
     terms: list[dict[str, Any]]
     nominal: _NominalEntry = Field(default_factory=_NominalEntry)
@@ -84,7 +73,7 @@ def _term_entries() -> dict[str, type[BaseModel]]:
             fields["law"] = (Literal[effect.law], effect.law if is_default else ...)
         fields |= {parameter.name: _field(parameter) for parameter in effect.parameters}
         doc = f"{effect.title}: {effect.equation} ({effect.source})"
-        entries[key] = create_model(f"term_{key.replace('/', '_')}", __config__=_STRICT, __doc__=doc, **fields)
+        entries[key] = create_model(f"term_{key.replace('/', '_')}", __config__=STRICT, __doc__=doc, **fields)
     return entries
 
 
@@ -96,7 +85,7 @@ def _plant_entries() -> dict[str, type[BaseModel]]:
         fields: dict[str, Any] = {"type": (Literal[plant.id], ...)}
         fields |= {parameter.name: _field(parameter) for parameter in (plant.driven or plant).parameters}
         doc = f"{plant.title}: {plant.equation} ({plant.source})"
-        entries[plant.id] = create_model(f"plant_{plant.id}", __config__=_STRICT, __doc__=doc, **fields)
+        entries[plant.id] = create_model(f"plant_{plant.id}", __config__=STRICT, __doc__=doc, **fields)
     return entries
 
 
@@ -119,13 +108,7 @@ def read_model(path: str | os.PathLike[str]) -> Model:
     Raises:
         ModelError: the file can't be read or isn't a valid model.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise ModelError(path, "no such file", "give the path of a fric-model/1 file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(path, f"cannot be read ({error})", "give the path of a fric-model/1 text file") from None
-    return model_from_text(text, str(path))
+    return model_from_text(text_of(path, FORMAT, ModelError), str(path))
 
 
 def model_from_text(text: str, source: str = "model") -> Model:
@@ -134,15 +117,7 @@ def model_from_text(text: str, source: str = "model") -> Model:
     Raises:
         ModelError: with line and reason.
     """
-    try:
-        tree = YAML(typ="rt").load(text)
-    except YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f", line {mark.line + 1}" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "is not YAML"
-        raise ModelError(f"{source}{line}", str(problem), "correct the YAML") from None
-    if not isinstance(tree, Mapping):
-        raise ModelError(source, "is not a model file", f"start it with 'format: {FORMAT}'")
+    tree = loaded(text, source, "a model file", FORMAT, ModelError)
     header = _validated(_Header, tree, tree, (), source)
     plant = _one_of(_plant_entries(), header.plant.get("type"), "type", tree, ("plant",), source)
     plant_entry = _validated(plant, header.plant, tree, ("plant",), source)
@@ -152,7 +127,7 @@ def model_from_text(text: str, source: str = "model") -> Model:
         effect = by_name(str(raw.get("effect")), str(raw.get("law", "")))
         laws = [known.law for known in EFFECTS.values() if known.id == raw.get("effect")]
         if effect is None and laws:
-            where = f"{source}, line {_line(tree, (*at, 'law'))}"
+            where = f"{source}, line {line_of(tree, (*at, 'law'))}"
             raise ModelError(where, f"law '{raw['law']}' of {raw['effect']} is not known", f"use one of {', '.join(laws)}")
         entry_type = _one_of(_term_entries(), effect.key if effect else raw.get("effect"), "effect", tree, at, source)
         entry = _validated(entry_type, raw, tree, at, source)
@@ -171,10 +146,10 @@ def model_from_text(text: str, source: str = "model") -> Model:
             provenance=header.provenance,
         )
     except ModelError as error:
-        raise ModelError(f"{source}, line {_line(tree, ('terms',))}", error.problem, error.remedy) from None
+        raise ModelError(f"{source}, line {line_of(tree, ('terms',))}", error.problem, error.remedy) from None
     stray = sorted(set(model.standard_errors) - set(model.names))
     if stray:
-        where = f"{source}, line {_line(tree, ('standard_errors', stray[0]))}"
+        where = f"{source}, line {line_of(tree, ('standard_errors', stray[0]))}"
         raise ModelError(
             where, f"standard error of '{stray[0]}', which the model doesn't have", f"use {', '.join(model.names)}"
         )
@@ -188,25 +163,13 @@ def _one_of(
     if found is None:
         known = ", ".join(dict.fromkeys(entry.split("/")[0] for entry in entries))
         given = "is missing" if name is None else f"'{name}' is not known"
-        raise ModelError(f"{source}, line {_line(tree, (*at, key))}", f"{key} {given}", f"use one of {known}")
+        raise ModelError(f"{source}, line {line_of(tree, (*at, key))}", f"{key} {given}", f"use one of {known}")
     return found
 
 
 def _validated(kind: type[BaseModel], raw: Any, tree: Any, at: tuple[str | int, ...], source: str) -> Any:
     """``raw`` as ``kind``; the first thing wrong with it as a ModelError with its line."""
-    try:
-        return kind.model_validate(raw)
-    except ValidationError as error:
-        # A misspelt key shows as one unknown and one missing: the unknown one says more.
-        first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
-        location = (*at, *(part for part in first["loc"] if not str(part).startswith(("term_", "plant_"))))
-        name = ".".join(str(part) for part in location) or "file"
-        keys = ", ".join(kind.model_fields)
-        what, remedy = {
-            "extra_forbidden": (f"unknown key '{name}'", f"use only {keys}"),
-            "missing": (f"'{name}' is missing", _remedy_for_missing(kind, first["loc"])),
-        }.get(first["type"], (f"'{name}' is {first['input']!r}", f"{first['msg'][0].lower()}{first['msg'][1:]}"))
-        raise ModelError(f"{source}, line {_line(tree, location)}", what, remedy) from None
+    return validated(kind, raw, tree, source, ModelError, at, partial(_remedy_for_missing, kind))
 
 
 def _remedy_for_missing(kind: type[BaseModel], location: Sequence[int | str]) -> str:
@@ -217,26 +180,8 @@ def _remedy_for_missing(kind: type[BaseModel], location: Sequence[int | str]) ->
     return f"add it, {described}" if described else "add it"
 
 
-def _line(tree: Any, location: Sequence[str | int]) -> int:
-    """Line of the file, counted from 1, at which the entry at ``location``, or the nearest one around it, stands."""
-    line = 1
-    for key in location:
-        if not hasattr(tree, "lc"):
-            break
-        try:
-            at = tree.lc.item(key) if isinstance(key, int) else tree.lc.key(key)
-            line = int(at[0]) + 1
-            tree = tree[key]
-        except (KeyError, IndexError, TypeError, AttributeError):
-            break
-    return line
-
-
 def model_to_text(model: Model) -> str:
     """``model`` as the text of a model file, with a unit behind every value."""
-    yaml = YAML(typ="rt")
-    yaml.default_flow_style = False
-    yaml.width = 120
 
     def entry(first: Mapping[str, str], parameters: Sequence[Parameter], values: Sequence[float]) -> CommentedMap:
         held = CommentedMap(first)
@@ -248,9 +193,7 @@ def model_to_text(model: Model) -> str:
     root = CommentedMap()
     root["format"] = FORMAT
     root["joint"] = model.joint
-    units = CommentedMap({"position": model.units.position, "force": model.units.force})
-    units.fa.set_flow_style()
-    root["units"] = units
+    root["units"] = units_entry(model.units)
     root["plant"] = entry({"type": model.plant.id}, model.plant.parameters, model.plant_values)
     terms = CommentedSeq()
     for held in model.terms:
@@ -265,9 +208,7 @@ def model_to_text(model: Model) -> str:
         root["standard_errors"] = CommentedMap({name: float(error) for name, error in model.standard_errors.items()})
     if model.provenance:
         root["provenance"] = CommentedMap(model.provenance)
-    stream = StringIO()
-    yaml.dump(root, stream)
-    return stream.getvalue()
+    return dumped(root)
 
 
 def write_model(model: Model, path: str | os.PathLike[str]) -> None:
