@@ -28,7 +28,8 @@ __all__ = ["Signature", "signatures"]
 _SPAN = 0.25  # [s], over which what may change with time is constant
 _ROWS = 6000  # that a fit uses at most
 _WAVES = 40  # periods along the travel that are tried
-_LAGS = 6  # widths of a force that lags behind the position
+_LAGS = 12  # widths of a force that lags behind the position
+_KNOTS = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # of the travel, from where on such a force may pull
 
 
 @dataclass(frozen=True)
@@ -181,7 +182,7 @@ def _lags(motion: Sequence[Motion]) -> Iterator[list[list[Array]]]:
         follower = [_follower(each.position, float(width)) for each in motion]
         yield [
             follower,
-            *([np.maximum(each - (low + share * travel), 0.0) for each in follower] for share in (0.2, 0.35, 0.5, 0.65, 0.8)),
+            *([np.maximum(each - (low + share * travel), 0.0) for each in follower] for share in _KNOTS),
             [np.abs(each - each[0]) for each in follower],
         ]
 
