@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -116,6 +117,10 @@ def test_the_report_is_plain_data_and_the_grown_model_reads_back(presliding: tup
     assert report["where"]["time"]
     assert report["where"]["time"] == report["findings"][0]["where"]["time"]
     assert {each["effect"] for each in report["rejected"]}.isdisjoint({each["effect"] for each in report["findings"]})
+    scored = report["validation"]
+    # The one is a force, the other its square over the spread of the force.
+    less = scored["force_error_augmented"] / scored["force_error_refit"]
+    assert less == pytest.approx(math.sqrt(scored["noe_augmented"] / scored["noe_refit"]), rel=1e-3)
     again = model_from_text(model_to_text(found.model), "grown")
     assert again.names == found.model.names
     np.testing.assert_allclose(again.values, found.model.values, rtol=1e-12)

@@ -124,6 +124,8 @@ def _print(found: Diagnosis, out: Path) -> None:
 
     console = Console()
     console.print(found.sentence, highlight=False, markup=False)
+    if found.force_errors_in_words:
+        console.print(found.force_errors_in_words, highlight=False, markup=False)
     for each in found.findings:
         console.print(f"- {each.evidence}; {each.component}; {each.where.regime}", highlight=False, markup=False)
     faults = [check for check in found.checks if check.verdict == "fault"]

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..instrument import Finding as Check
 from ..model import Model
 from ..record import Array
@@ -201,8 +203,34 @@ class Diagnosis:
         )
         return f"Missing: {names}; with it the NOE on unseen data falls from {v.noe_refit:.3g} % to {v.noe_augmented:.3g} %."
 
+    @property
+    def force_errors(self) -> tuple[float, float] | None:
+        """Root mean square of the force missing on unseen recordings [F], refitted and grown; None where means are compared."""
+        if self.by_means or not any(p.time.size for p in self.prediction):
+            return None
+        refit, grown = (
+            math.sqrt(float(np.mean(np.concatenate(parts) ** 2)))
+            for parts in (
+                [p.force_measured - p.force_refit for p in self.prediction],
+                [p.force_measured - p.force_augmented for p in self.prediction],
+            )
+        )
+        return refit, grown
+
+    @property
+    def force_errors_in_words(self) -> str:
+        """What :attr:`force_errors` says, or nothing where nothing was found or they don't exist."""
+        errors = self.force_errors
+        if errors is None or not self.findings:
+            return ""
+        refit, grown = errors
+        less = 100.0 * (1.0 - grown / refit) if refit > 0.0 else 0.0
+        unit = self.given.units.force
+        return f"Force error on held-back data: {refit:.3g} {unit} refitted, {grown:.3g} {unit} grown, {less:.3g} % less."
+
     def report(self) -> dict[str, Any]:
         """The contents of ``report.json``; numbers that aren't finite become null."""
+        errors = self.force_errors or (None, None)
         report = {
             "format": FORMAT,
             "verdict": self.sentence,
@@ -224,6 +252,8 @@ class Diagnosis:
                 "noe_refit": self.validation.noe_refit,
                 "noe_augmented": self.validation.noe_augmented,
                 "noise_floor": self.validation.noise_floor,
+                "force_error_refit": errors[0],
+                "force_error_augmented": errors[1],
             },
             "unexplained": {"share": self.unexplained.share, "where": _where(self.unexplained.where)},
             "next_experiment": self.next_experiment,

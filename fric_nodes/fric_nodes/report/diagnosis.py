@@ -48,6 +48,7 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
                         (f"{v.noise_floor:.3g} %", "what the instruments alone leave"),
                     ]
                 ),
+                *([paragraph(found.force_errors_in_words)] if found.force_errors_in_words else []),
             ),
         ),
     ]
