@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.component import signatures
+from fric_nodes.diagnosis.component import Signature, agreed, signatures
 from fric_nodes.diagnosis.fitting import refit
 from fric_nodes.diagnosis.track import Track
 from fric_nodes.model import build_model, term
@@ -44,6 +44,50 @@ def _recorded(friction: Callable[[float], float], gain: Callable[[float], float]
 
 def _always(t: float) -> float:
     return 1.0
+
+
+def _pulled_by_a_chain() -> Record:
+    """The axis rests and sticks for two fifths of the time, and a chain behind it, with play, pulls on one side."""
+    n, h = 10_000, _STEP / _FINER
+    position, effort = np.empty(n), np.empty(n)
+    q = v = chain = 0.0
+    for k in range(n):
+        # Time of the reference: it stands still from 2.4 to 4 s of each four.
+        t = 2.4 * (k * _STEP // 4.0) + min(k * _STEP % 4.0, 2.4)
+        r = sum(a * math.sin(2 * math.pi * f * t + p) - a * math.sin(p) for f, a, p in _SWINGS)
+        u = 3000.0 * (r - q) - 120.0 * v
+        position[k], effort[k] = q, u
+        for _ in range(_FINER):
+            chain = max(q - 0.012, min(q + 0.012, chain))
+            drive = u - 150.0 * max(chain + 0.02, 0.0)
+            if v == 0.0 and abs(drive) <= _LEVEL:
+                continue
+            way = math.copysign(1.0, v if v != 0.0 else drive)
+            faster = v + h / _MASS * (drive - way * _LEVEL - _VISCOUS * v)
+            v = 0.0 if faster * v < 0.0 else faster
+            q += h * v
+    noisy = effort + 0.05 * np.random.default_rng(8).standard_normal(n)
+    return Record(_STEP * np.arange(n), np.round(position / 1e-7) * 1e-7, noisy, effort_hold="following")
+
+
+@pytest.mark.parametrize("bandwidth", [45.0, 140.0])
+def test_what_a_contact_takes_up_at_rest_is_not_missing_there(bandwidth: float) -> None:
+    nominal = build_model("rigid", {"mass": _MASS}, [term("coulomb", force=_LEVEL), term("viscous", coefficient=_VISCOUS)])
+    record = _pulled_by_a_chain()
+    assert np.mean(np.diff(record.position) == 0.0) > 0.2
+    track = Track.of([record], bandwidth, nominal)
+    found = signatures(track, refit(track, nominal).fit)
+    assert (found[0].component, found[0].title) == ("load", "a force that hangs on the position and lags behind it")
+    assert found[0].share > 0.85
+
+
+def test_observers_are_heard_alike() -> None:
+    slow = [Signature("command path", "gain", 0.90, -2.20), Signature("guideway friction", "level", 0.89, -2.15)]
+    fast = [Signature("guideway friction", "level", 0.95, -2.90), Signature("command path", "gain", 0.85, -1.80)]
+    assert agreed([slow]).component == "command path"
+    both = agreed([slow, fast])
+    assert both.component == "guideway friction"
+    assert both.share == 0.89  # as the first of them sees it
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,11 @@ A force has the signature of what makes it, also where its law isn't known. Each
 free in what a law would fix: friction whose level or slope changes with time as it likes, friction that goes with the motor's
 force; an actuator whose gain changes with time as it likes; a load whose mass changes with time as it likes, a force that
 swings at one frequency whatever the axis does, a force that hangs on the position and lags behind it; a sensor whose reading
-is off by a wave along the travel. Each is fitted, together with the nominal parameters, to what is missing, and what it
-explains is held against the number of its coefficients (Schwarz's criterion); the best names the component. The effects of
-the registry take part: where one of them comes closest, its component is named.
+is off by a wave along the travel. What a contact takes up where the body rests isn't missing there. Each is fitted, together
+with the nominal parameters, to what is missing, and what it explains is held against the number of its coefficients (Schwarz's
+criterion); the best names the component. The effects of the registry take part: where one of them comes closest, its component
+is named. Observers of several speeds see different sides of it, a slow one the level of a force, a fast one how a contact
+sticks: they are heard alike.
 """
 
 from __future__ import annotations
@@ -23,12 +25,13 @@ from .candidates import place_of
 from .screen import Tried
 from .track import Fit, Motion, Track
 
-__all__ = ["Signature", "signatures"]
+__all__ = ["Signature", "agreed", "signatures"]
 
 _SPAN = 0.25  # [s], over which what may change with time is constant
 _ROWS = 6000  # that a fit uses at most
 _WAVES = 40  # periods along the travel that are tried
 _LAGS = 12  # widths of a force that lags behind the position
+_REST = 0.01  # of the speed, below which a body rests
 _KNOTS = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # of the travel, from where on such a force may pull
 
 
@@ -40,7 +43,7 @@ class Signature:
         component: part of the machine.
         title: the way, in words.
         share: of the missing force's energy that it explains.
-        evidence: how far it is to be believed: the information criterion of Bayes, the smaller the better.
+        evidence: how far it is to be believed: the information criterion of Bayes per independent number, the less the better.
     """
 
     component: str
@@ -74,7 +77,7 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
     independent = max(track.independent, 50.0)
     held = _Motions(track.motion, [run.effort for run in track.runs], track.time)
     found: dict[str, Signature] = {}
-    for component, title, columns in _ways(track, held, missing, _rubbing(fit.model, held), fit.model.plant.led):
+    for component, title, columns in _ways(track, held, missing, fit.model):
         n = columns.shape[1]
         left = _left(np.concatenate([nominal, columns[::stride]], axis=1), target)
         signature = _marked(component, title, left / max(alone, 1e-300), n, independent)
@@ -88,10 +91,25 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
     return sorted(found.values(), key=lambda each: each.evidence)
 
 
+def agreed(of_observers: Sequence[Sequence[Signature]]) -> Signature:
+    """The likeliest signature of the component that several observers together find likeliest, as the first of them sees it.
+
+    Args:
+        of_observers: what :func:`signatures` gives for each.
+    """
+    best = [
+        {each.component: each for each in reversed(found)}  # the likeliest of each component
+        for found in of_observers
+    ]
+    names = {name for each in best for name in each}
+    likeliest = min(sorted(names), key=lambda name: sum(each[name].evidence for each in best if name in each))
+    return next(each[likeliest] for each in best if likeliest in each)
+
+
 def _marked(component: str, title: str, left: float, n: int, independent: float) -> Signature:
     """The signature of ``n`` coefficients that leave the share ``left`` of ``independent`` numbers."""
     left = max(left, 1e-6)
-    return Signature(component, title, 1.0 - left, independent * math.log(left) + n * math.log(independent))
+    return Signature(component, title, 1.0 - left, math.log(left) + n * math.log(independent) / independent)
 
 
 def _left(columns: Array, target: Array) -> float:
@@ -113,25 +131,27 @@ def _rubbing(model: Model, held: _Motions) -> list[Array]:
     ]
 
 
-def _ways(
-    track: Track, held: _Motions, missing: Array, rubbing: Sequence[Array], led: bool
-) -> Iterator[tuple[str, str, Array]]:
-    """Component, way, and its columns, shape ``(n, n_columns)`` each; of a contact where a rig has ``led`` it."""
+def _ways(track: Track, held: _Motions, missing: Array, model: Model) -> Iterator[tuple[str, str, Array]]:
+    """Component, way, and its columns, shape ``(n, n_columns)`` each."""
     rate = [each.velocity for each in held.motion]
     fast = max(float(np.quantile(np.abs(np.concatenate(rate)), 0.9)), 1e-12)
-    way = [np.tanh(v / (0.02 * fast)) for v in rate]
+    way = [np.tanh(v / (_REST * fast)) for v in rate]
+    sticks = any(each.effect.level is not None for each in model.terms)
+    free = [np.abs(each) if sticks else np.ones_like(each) for each in way]
     guideway, load = "guideway friction", "load"
     yield guideway, "friction whose level changes with time", _changing(track, way, held.time)
-    yield guideway, "friction whose level changes with time", _changing(track, rubbing, held.time)
+    yield guideway, "friction whose level changes with time", _changing(track, _rubbing(model, held), held.time)
     yield guideway, "friction whose slope changes with time", _changing(track, rate, held.time)
     driven = [sign * np.abs(u) for sign, u in zip(way, held.effort, strict=True)]
     yield guideway, "friction that goes with the motor's force", _seen(track, [driven])
-    if not led:  # what is measured at a contact is behind the drive and the mass
-        yield "command path", "an actuator whose gain changes with time", _changing(track, held.effort, held.time)
+    if not model.plant.led:  # what is measured at a contact is behind the drive and the mass
+        given = [moves * u for moves, u in zip(free, held.effort, strict=True)]
+        yield "command path", "an actuator whose gain changes with time", _changing(track, given, held.time)
         yield load, "a mass that changes with time", _changing(track, [each.acceleration for each in held.motion], held.time)
-    yield load, "a force that swings at one frequency", _tone(track, held.time, missing)
+    yield load, "a force that swings at one frequency", _tone(track, held.time, missing, free)
     for lagging in _lags(held.motion):
-        yield load, "a force that hangs on the position and lags behind it", _seen(track, lagging)
+        pulling = [[moves * force for moves, force in zip(free, each, strict=True)] for each in lagging]
+        yield load, "a force that hangs on the position and lags behind it", _seen(track, pulling)
     for wave in _waves(held.motion):
         yield "sensor", "a reading that is off by a wave along the travel", _seen(track, wave)
 
@@ -156,8 +176,8 @@ def _changing(track: Track, signal: Sequence[Array], time: Sequence[Array]) -> A
     return columns
 
 
-def _tone(track: Track, time: Sequence[Array], missing: Array) -> Array:
-    """A sine and a cosine at the frequency at which most force is missing, for each run."""
+def _tone(track: Track, time: Sequence[Array], missing: Array, free: Sequence[Array]) -> Array:
+    """A sine and a cosine at the frequency at which most force is missing, for each run, where it is ``free`` to move."""
     parts = track.split(missing)
     longest = max(range(len(parts)), key=lambda k: parts[k].shape[0])
     step = track.runs[longest].sample_time
@@ -169,7 +189,7 @@ def _tone(track: Track, time: Sequence[Array], missing: Array) -> Array:
     for k in range(len(time)):
         for function in (np.sin, np.cos):
             signal = [np.zeros_like(each) for each in time]
-            signal[k] = function(2.0 * math.pi * frequency * time[k])
+            signal[k] = free[k] * function(2.0 * math.pi * frequency * time[k])
             waves.append(signal)
     return _seen(track, waves)
 

@@ -28,7 +28,7 @@ from ..record import Array, Record
 from ..threads import linear_algebra_in_one
 from .blocks import one_sided
 from .candidates import Scales, candidates, place_of, scales_of
-from .component import Signature, signatures
+from .component import Signature, agreed, signatures
 from .confidence import AS_LIKELY, UNEXPLAINED, confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, free_names, refit
@@ -54,6 +54,7 @@ _MANY = 3  # effects at once that still leave something are more likely to have 
 _SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, something unknown remains however little is known of the floor
 _FIRST_FIT = 6  # iterations, by which starts are compared
+_MOSTLY = 0.5  # of what a grown model leaves, for a signature to say what that is
 _STANDS_OUT = 10.0  # times the floor
 _LOCATING = 600.0  # [rad/s], for spans of time
 _LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of the physics
@@ -462,19 +463,24 @@ def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation
 
 
 def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float) -> tuple[Signature, bool]:
-    """The signature of all that is missing, and True, where it explains more than what was grown; else that of what is left.
+    """The signature of what is missing, and True where it explains more than what was grown.
 
-    Looked at by the slowest observer to which it stands out: a slow one blurs how a contact sticks.
+    That is of all that is missing, by the observers to which it stands out; of what is left, where the grown model explains
+    more and the signature most of what that leaves.
     """
-    for track in sorted(tracks, key=lambda each: each.bandwidth):
-        state = refit(track, growth.begin.fit.model, max_iterations=_FIRST_FIT)
-        if state.excess > _STANDS_OUT * state.floor or track.bandwidth >= growth.track.bandwidth:
-            break
-    whole = signatures(track, state.fit, () if growth.steps else growth.last)[0]
+    looks = [
+        (track, refit(track, growth.begin.fit.model, max_iterations=_FIRST_FIT))
+        for track in sorted(tracks, key=lambda each: each.bandwidth)
+    ]
+    clear = [(track, state) for track, state in looks if state.excess > _STANDS_OUT * state.floor]
+    clear = clear or [look for look in looks if look[0].bandwidth == growth.track.bandwidth]
+    whole = agreed([signatures(track, state.fit, () if growth.steps else growth.last) for track, state in clear])
     # What hardly explains anything has no say in what is left either.
     if not growth.steps or whole.share > 1.0 - rest or rest > _HARDLY:
         return whole, True
-    return signatures(track, refit(track, growth.end.fit.model, max_iterations=_FIRST_FIT).fit, growth.last)[0], False
+    track = clear[0][0]
+    left = signatures(track, refit(track, growth.end.fit.model, max_iterations=_FIRST_FIT).fit, growth.last)[0]
+    return (left if left.share > _MOSTLY else whole), False
 
 
 def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, ...]:
