@@ -139,15 +139,21 @@ def _ways(track: Track, held: _Motions, missing: Array, model: Model) -> Iterato
     sticks = any(each.effect.level is not None for each in model.terms)
     free = [np.abs(each) if sticks else np.ones_like(each) for each in way]
     guideway, load = "guideway friction", "load"
-    yield guideway, "friction whose level changes with time", _changing(track, way, held.time)
-    yield guideway, "friction whose level changes with time", _changing(track, _rubbing(model, held), held.time)
-    yield guideway, "friction whose slope changes with time", _changing(track, rate, held.time)
+    changing: list[tuple[str, str, Sequence[Array]]] = [
+        (guideway, "friction whose level changes with time", way),
+        (guideway, "friction whose level changes with time", _rubbing(model, held)),
+        (guideway, "friction whose slope changes with time", rate),
+    ]
     driven = [sign * np.abs(u) for sign, u in zip(way, held.effort, strict=True)]
     yield guideway, "friction that goes with the motor's force", _seen(track, [driven])
     if not model.plant.led:  # what is measured at a contact is behind the drive and the mass
         given = [moves * u for moves, u in zip(free, held.effort, strict=True)]
-        yield "command path", "an actuator whose gain changes with time", _changing(track, given, held.time)
-        yield load, "a mass that changes with time", _changing(track, [each.acceleration for each in held.motion], held.time)
+        changing.append(("command path", "an actuator whose gain changes with time", given))
+        changing.append((load, "a mass that changes with time", [each.acceleration for each in held.motion]))
+    for component, title, signal in changing:
+        seen = track.seen(list(signal))
+        for weights in (_spans(track, held.time), _slopes(track, held.time)):
+            yield component, title, weights * seen[:, None]
     yield load, "a force that swings at one frequency", _tone(track, held.time, missing, free)
     for lagging in _lags(held.motion):
         pulling = [[moves * force for moves, force in zip(free, each, strict=True)] for each in lagging]
@@ -161,19 +167,35 @@ def _seen(track: Track, signals: Sequence[Sequence[Array]]) -> Array:
     return np.stack([track.seen(list(each)) for each in signals], axis=1)
 
 
-def _changing(track: Track, signal: Sequence[Array], time: Sequence[Array]) -> Array:
-    """Columns of ``signal`` within each span of time and zero outside."""
-    column = track.seen(list(signal))
-    # Spans of one run aren't those of another, also where the clocks of two recordings show the same.
+def _knots(track: Track, time: Sequence[Array]) -> tuple[Array, int]:
+    """Time of each row in spans, those of one run before those of the next, and how many there are.
+
+    Spans of one run aren't those of another, also where the clocks of two recordings show the same.
+    """
     number, first = [], 0
     for each in time:
-        span = ((each - each[0]) / _SPAN).astype(np.int64)
+        span = (each - each[0]) / _SPAN
         number.append(first + span)
-        first += int(span[-1]) + 1
-    which = np.concatenate(track.split(track.joined(number))).astype(np.int64)
-    columns = np.zeros((column.shape[0], int(which[-1]) + 1))
-    columns[np.arange(column.shape[0]), which] = column
-    return columns
+        first += int(span[-1]) + 2
+    return np.concatenate(track.split(track.joined(number))), first
+
+
+def _spans(track: Track, time: Sequence[Array]) -> Array:
+    """One within each span of time and zero outside, shape ``(n, n_spans)``: what changes in steps."""
+    at, n = _knots(track, time)
+    weights = np.zeros((at.shape[0], n))
+    weights[np.arange(at.shape[0]), at.astype(np.int64)] = 1.0
+    return weights[:, np.any(weights, axis=0)]
+
+
+def _slopes(track: Track, time: Sequence[Array]) -> Array:
+    """One at each end of a span, falling to zero at the next ones, shape ``(n, n_ends)``: what changes steadily."""
+    at, n = _knots(track, time)
+    rows, before = np.arange(at.shape[0]), at.astype(np.int64)
+    weights = np.zeros((at.shape[0], n))
+    weights[rows, before] = 1.0 - (at - before)
+    weights[rows, before + 1] = at - before
+    return weights[:, np.any(weights, axis=0)]
 
 
 def _tone(track: Track, time: Sequence[Array], missing: Array, free: Sequence[Array]) -> Array:
