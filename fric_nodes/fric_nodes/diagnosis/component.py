@@ -139,21 +139,19 @@ def _ways(track: Track, held: _Motions, missing: Array, model: Model) -> Iterato
     sticks = any(each.effect.level is not None for each in model.terms)
     free = [np.abs(each) if sticks else np.ones_like(each) for each in way]
     guideway, load = "guideway friction", "load"
-    changing: list[tuple[str, str, Sequence[Array]]] = [
-        (guideway, "friction whose level changes with time", way),
-        (guideway, "friction whose level changes with time", _rubbing(model, held)),
-        (guideway, "friction whose slope changes with time", rate),
-    ]
+    steps, steadily = _spans(track, held.time), _slopes(track, held.time)
+    yield guideway, "friction whose level changes with time", _changing(track, way, steps)
+    yield guideway, "friction whose level changes with time", _changing(track, _rubbing(model, held), steps)
+    # A film thins and thickens, where dirt or a supply comes and goes.
+    yield guideway, "friction whose slope changes with time", _changing(track, rate, steps)
+    yield guideway, "friction whose slope changes with time", _changing(track, rate, steadily)
     driven = [sign * np.abs(u) for sign, u in zip(way, held.effort, strict=True)]
     yield guideway, "friction that goes with the motor's force", _seen(track, [driven])
     if not model.plant.led:  # what is measured at a contact is behind the drive and the mass
         given = [moves * u for moves, u in zip(free, held.effort, strict=True)]
-        changing.append(("command path", "an actuator whose gain changes with time", given))
-        changing.append((load, "a mass that changes with time", [each.acceleration for each in held.motion]))
-    for component, title, signal in changing:
-        seen = track.seen(list(signal))
-        for weights in (_spans(track, held.time), _slopes(track, held.time)):
-            yield component, title, weights * seen[:, None]
+        yield "command path", "an actuator whose gain changes with time", _changing(track, given, steps)
+        acceleration = [each.acceleration for each in held.motion]
+        yield load, "a mass that changes with time", _changing(track, acceleration, steps)
     yield load, "a force that swings at one frequency", _tone(track, held.time, missing, free)
     for lagging in _lags(held.motion):
         pulling = [[moves * force for moves, force in zip(free, each, strict=True)] for each in lagging]
@@ -165,6 +163,11 @@ def _ways(track: Track, held: _Motions, missing: Array, model: Model) -> Iterato
 def _seen(track: Track, signals: Sequence[Sequence[Array]]) -> Array:
     """Columns of forces, as the observer sees them; each of ``signals`` has one array per run."""
     return np.stack([track.seen(list(each)) for each in signals], axis=1)
+
+
+def _changing(track: Track, signal: Sequence[Array], weights: Array) -> Array:
+    """Columns of ``signal``, one value per sample of each run, by the ``weights`` over time of each."""
+    return weights * track.seen(list(signal))[:, None]
 
 
 def _knots(track: Track, time: Sequence[Array]) -> tuple[Array, int]:
