@@ -99,8 +99,7 @@ def validated(
     except ValidationError as error:
         # A misspelt key shows as one unknown and one missing: the unknown one says more.
         first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
-        # Members of a union stand in the place, too.
-        location = (*at, *(part for part in first["loc"] if not str(part).startswith(("term_", "plant_"))))
+        location = (*at, *first["loc"])
         name = ".".join(str(part) for part in location) or "file"
         problem, remedy = {
             "extra_forbidden": (f"unknown key '{name}'", f"use only {', '.join(kind.model_fields)}"),

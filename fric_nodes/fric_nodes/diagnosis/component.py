@@ -27,11 +27,11 @@ from .track import Fit, Motion, Track
 
 __all__ = ["Signature", "agreed", "signatures"]
 
-_SPAN = 0.25  # [s], over which what may change with time is constant
+_SPAN = 0.25  # [s], of the steps in which something changes with time
+_REST = 0.01  # of the speed, below which a body rests
 _ROWS = 6000  # that a fit uses at most
 _WAVES = 40  # periods along the travel that are tried
 _LAGS = 12  # widths of a force that lags behind the position
-_REST = 0.01  # of the speed, below which a body rests
 _KNOTS = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # of the travel, from where on such a force may pull
 
 
