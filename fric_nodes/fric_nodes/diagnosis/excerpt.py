@@ -66,7 +66,7 @@ def excerpt(tracks: Sequence[Track], nominal: Model, most: int = MOST) -> Excerp
         nominal: with values that a fit can start from.
         most: samples.
     """
-    n_all = sum(run.effort.shape[0] for run in tracks[0].runs)
+    n_all = tracks[0].n_samples
     if n_all <= 1.25 * most:
         return None
     step = float(np.median(np.concatenate([run.step for run in tracks[0].runs])))
@@ -74,8 +74,8 @@ def excerpt(tracks: Sequence[Track], nominal: Model, most: int = MOST) -> Excerp
     cells = _cells(tracks[0], min(length, most // 4))
     kept = _chosen(_energy(tracks[len(tracks) // 2], nominal, cells, most), max(most // length, 4))
     spans = _joined(cells[kept])
-    parts = tuple(_restricted(track, spans) for track in tracks)
-    return Excerpt(parts, tuple(tracks), sum(run.effort.shape[0] for run in parts[0].runs), n_all)
+    parts = tuple(track.parts(spans) for track in tracks)
+    return Excerpt(parts, tuple(tracks), parts[0].n_samples, n_all)
 
 
 def _cells(track: Track, length: int) -> Index:
@@ -101,7 +101,7 @@ def _cells(track: Track, length: int) -> Index:
 def _energy(track: Track, nominal: Model, cells: Index, most: int) -> Array:
     """Mean square of the force that ``nominal``, fitted to evenly spread cells, lacks in each cell [F^2]."""
     even = np.unique(np.linspace(0, len(cells) - 1, max(most // int(np.max(cells[:, 2] - cells[:, 1])), 4)).astype(np.int64))
-    fitted = _restricted(track, cells[even]).fit(nominal, free_names(nominal), _FIRST_FIT).model
+    fitted = track.parts(_spans(cells[even])).fit(nominal, free_names(nominal), _FIRST_FIT).model
     lacking = track.padded(track.residual(fitted))
     return np.array([float(np.mean(lacking[k][first:last] ** 2)) for k, first, last in cells.tolist()])
 
@@ -114,23 +114,19 @@ def _chosen(energy: Array, n_kept: int) -> Index:
     return np.sort(np.concatenate([even, np.array(most[: max(n_kept - even.size, 0)], dtype=np.int64)]))
 
 
-def _joined(cells: Index) -> Index:
+def _joined(cells: Index) -> list[tuple[int, int, int]]:
     """The cells, neighbours made one."""
-    found: list[list[int]] = []
-    for run, first, last in cells.tolist():
+    found: list[tuple[int, int, int]] = []
+    for run, first, last in _spans(cells):
         if found and found[-1][0] == run and found[-1][2] == first:
-            found[-1][2] = last
+            found[-1] = (run, found[-1][1], last)
         else:
-            found.append([run, first, last])
-    return np.array(found, dtype=np.int64)
+            found.append((run, first, last))
+    return found
 
 
-def _restricted(track: Track, spans: Index) -> Track:
-    """The parts of the track that ``spans`` name."""
-    held = replace(track, runs=(), time=(), record=(), noise=())
-    for k, first, last in spans.tolist():
-        held = held.with_run(track.runs[k].part(first, last), track.time[k][first:last], track.record[k], track.noise[k])
-    return held
+def _spans(cells: Index) -> list[tuple[int, int, int]]:
+    return [(run, first, last) for run, first, last in cells.tolist()]
 
 
 def _share(left: float) -> str:

@@ -35,7 +35,7 @@ def with_best_laws(track: Track, state: State, steps: Sequence[Step], tell: Call
         for term in laws_beside(model.terms[place]):
             tried = refit(track, model.with_terms(term if k == place else held for k, held in enumerate(model.terms)))
             best = min(best, tried, key=lambda each: each.left)
-        if state.left - best.left < _BETTER * state.excess:
+        if state.left - best.left <= _BETTER * state.excess or state.excess == 0.0:
             continue
         law = best.fit.model.terms[place].effect.law
         tell(f"{step.term} by the law {law}: leaves {100.0 * best.excess / state.excess:.0f} % of what was left")

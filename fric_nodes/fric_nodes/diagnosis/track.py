@@ -36,6 +36,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 from ..identification.gauss_newton import Solution, minimise
 from ..identification.innovations import Run, noise_of, runs_of
 from ..model import Model, Term
+from ..plants import PLANTS
 from ..record import Array, Index, Mask, Record
 from ..simulate import respond, substeps
 from ..threads import n_threads
@@ -51,6 +52,8 @@ _STEP_OF_RATE = 0.2
 _MOST_STEPS = 4  # per sample: the step is implicit, and what is faster than the observer changes nothing that it sees
 _STEP_OF_OBSERVER = 0.4  # of the observer's time constant: shorter ones it can't tell from this
 _SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
+_OVER = 0.2  # [s] after which it doesn't matter where in its gap a body began, how its spring was bent or a command had come
+_FORGOTTEN = 1.0  # [s] the same for what friction remembers, and for what rings on the body
 _MOST_GAIN = 2.5  # times gain and 2 alpha + beta; at 4 the pursuit of a mass begins to swing
 _LIGHTEST = 4.0  # times lighter than the mass whose impulses lead it, a model at most
 _NOTHING = np.zeros(1)
@@ -119,6 +122,8 @@ class Track:
         mass: by which being behind becomes a force [F s^2/x].
         noise: of the position for each run [x].
         sizes: typical size of a linear parameter by its dimension, for those that are near zero.
+        lead: intervals at the beginning of each run that come before the part that counts; models that remember are led
+            through them, so that they remember what there was.
     """
 
     runs: tuple[Run, ...]
@@ -128,6 +133,7 @@ class Track:
     mass: float
     noise: tuple[float, ...]
     sizes: Mapping[str, float]
+    lead: tuple[int, ...]
 
     @classmethod
     def of(cls, records: Sequence[Record], bandwidth: float, model: Model) -> Track:
@@ -146,34 +152,62 @@ class Track:
                 number.append(k)
                 noise.append(max(noise_of(run.position), _SHAKEN * resolution(run.position)))
         mass = model.total_inertia
-        return cls(tuple(runs), tuple(time), tuple(number), bandwidth, mass, tuple(noise), _sizes(runs, mass))
+        return cls(tuple(runs), tuple(time), tuple(number), bandwidth, mass, tuple(noise), _sizes(runs, mass), (0,) * len(runs))
 
-    def with_run(self, run: Run, time: Array, record: int, noise: float) -> Track:
-        """The same with one more run."""
+    def parts(self, spans: Sequence[tuple[int, int, int]]) -> Track:
+        """The parts of the recordings in ``spans``: run, first and last interval (exclusive) of each."""
+        runs, time, lead = [], [], []
+        for k, first, last in spans:
+            before = min(first, math.ceil(_FORGOTTEN / self.runs[k].sample_time))
+            runs.append(self.runs[k].part(first - before, last))
+            time.append(self.time[k][first - before : last])
+            lead.append(before)
         return replace(
             self,
-            runs=(*self.runs, run),
-            time=(*self.time, time),
-            record=(*self.record, record),
-            noise=(*self.noise, noise),
+            runs=tuple(runs),
+            time=tuple(time),
+            record=tuple(self.record[k] for k, _, _ in spans),
+            noise=tuple(self.noise[k] for k, _, _ in spans),
+            lead=tuple(lead),
         )
+
+    @property
+    def n_samples(self) -> int:
+        """Intervals that count."""
+        return sum(run.effort.shape[0] - lead for run, lead in zip(self.runs, self.lead, strict=True))
 
     @property
     def starts(self) -> Index:
         """First residual of each run."""
-        return np.cumsum([0, *(run.effort.shape[0] - self._settling(run) for run in self.runs)])[:-1]
+        return np.cumsum([0, *(run.effort.shape[0] - self._settling(k) for k, run in enumerate(self.runs))])[:-1]
 
     @property
     def independent(self) -> float:
         """About how many independent numbers a residual holds: it is low-passed."""
-        return 0.5 * self.bandwidth * float(sum(np.sum(run.step) for run in self.runs))
+        return (
+            0.5 * self.bandwidth * float(sum(np.sum(run.step[lead:]) for run, lead in zip(self.runs, self.lead, strict=True)))
+        )
 
-    def _settling(self, run: Run) -> int:
-        return int(min(max(math.ceil(_SETTLING / (self.bandwidth * run.sample_time)), 20), run.effort.shape[0] // 3))
+    def _settling(self, k: int) -> int:
+        """Intervals of run ``k`` that don't count: those that lead to it, or until the observer has settled."""
+        return max(self.lead[k], min(self._settled(k), len(self.runs[k].effort) // 3))
+
+    def _settled(self, k: int) -> int:
+        """Intervals until the observer has settled in run ``k``."""
+        return max(math.ceil(_SETTLING / (self.bandwidth * self.runs[k].sample_time)), 20)
+
+    def _first(self, model: Model, k: int) -> int:
+        """Interval of run ``k`` at which ``model`` has to begin so that it knows all it must where it counts."""
+        if any(held.effect.n_memory and held.effect.command is None for held in model.terms):
+            return 0
+        run_in = self._settled(k)
+        if model.has_command_path or model.has_slip_dynamics or model.plant is PLANTS[model.plant.id].driven:
+            run_in = max(run_in, math.ceil(_OVER / self.runs[k].sample_time))
+        return max(self.lead[k] - run_in, 0)
 
     def joined(self, of_run: Sequence[Array]) -> Array:
         """Signals with one value per interval of each run, without the settling, joined, shape ``(n,)``."""
-        return np.concatenate([part[self._settling(run) :] for run, part in zip(self.runs, of_run, strict=True)])
+        return np.concatenate([part[self._settling(k) :] for k, part in enumerate(of_run)])
 
     def split(self, joined: Array) -> list[Array]:
         """What :meth:`joined` gives, per run."""
@@ -214,22 +248,24 @@ class Track:
         values, plant_values = universe.values(model), np.array(model.plant_values)
         inertia = model.total_inertia
         parts = []
-        for k, run in enumerate(self.runs):
-            effort = run.effort if twin is None else twin.efforts[k]
-            extra = _NOTHING if twin is None else twin.extras[k]
-            position = run.position if twin is None else twin.positions[k]
-            alpha, beta = self.gains(run)
-            state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k))
-            found = np.empty(effort.shape[0])
-            around = run.step, self.n_substeps(model, run), run.load, run.temperature, alpha, beta
-            last = state, *self.inner_states(model, k, run.start[1]), found
+        for k, whole in enumerate(self.runs):
+            first, n = self._first(model, k), whole.effort.shape[0]
+            run = whole.part(first, n) if first else whole
+            effort = run.effort if twin is None else twin.efforts[k][first:]
+            extra = _NOTHING if twin is None else twin.extras[k][first:]
+            position = run.position if twin is None else twin.positions[k][first:]
+            alpha, beta = self.gains(whole)
+            state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k, first))
+            found = np.zeros(n)
+            around = run.step, self.n_substeps(model, whole), run.load, run.temperature, alpha, beta
+            last = state, *self.inner_states(model, k, run.start[1]), found[first:]
             if mass is None:
                 universe.loops.observe(values, effort, position, *around, self.noise[k], *last)
             else:
                 gain = min(mass / inertia, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
                 universe.loops.pursue(values, effort, extra, position, *around, gain, self.noise[k], *last)
             with np.errstate(over="ignore"):  # a model that escapes has no number for it
-                parts.append((inertia if mass is None else mass) * beta / run.sample_time**2 * found)
+                parts.append((inertia if mass is None else mass) * beta / whole.sample_time**2 * found)
         return self._finite(self.joined(parts))
 
     def _lacking_at_contact(self, model: Model, twin: Twin | None) -> Array:
@@ -330,9 +366,12 @@ class Track:
         force = float(np.median(self.runs[k].effort[:_FIRST])) if model.plant.led else 0.0
         return universe_of(model).inner_states(model, velocity, force)
 
-    def begin(self, k: int) -> float:
-        """Time in its recording at which run ``k`` begins [s]: a part must not take a slow drift for a new one."""
-        return float(self.time[k][0] - self.runs[k].step[0])
+    def begin(self, k: int, first: int = 0) -> float:
+        """Time in its recording at which interval ``first`` of run ``k`` begins [s].
+
+        A part must not take a slow drift for a new one.
+        """
+        return float(self.time[k][first] - self.runs[k].step[first])
 
     def n_substeps(self, model: Model, run: Run) -> int:
         """Steps of ``model`` per sample, enough for what the observer sees.
