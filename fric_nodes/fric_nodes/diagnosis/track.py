@@ -52,13 +52,14 @@ _STEP_OF_RATE = 0.2
 _MOST_STEPS = 4  # per sample: the step is implicit, and what is faster than the observer changes nothing that it sees
 _STEP_OF_OBSERVER = 0.4  # of the observer's time constant: shorter ones it can't tell from this
 _SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
-_OVER = 0.2  # [s] after which it doesn't matter where in its gap a body began, how its spring was bent or a command had come
-_FORGOTTEN = 1.0  # [s] the same for what friction remembers, and for what rings on the body
+_OVER = 0.3  # [s] after which it doesn't matter where in its gap a body began, how its spring was bent or a command had come
+_FORGOTTEN = 3.0  # [s] the same for what friction remembers, and for what rings on the body
 _MOST_GAIN = 2.5  # times gain and 2 alpha + beta; at 4 the pursuit of a mass begins to swing
 _LIGHTEST = 4.0  # times lighter than the mass whose impulses lead it, a model at most
 _NOTHING = np.zeros(1)
 _TINY = 1e-9  # of its scale, the least that a positive parameter may be
 _SHORTEST = 200  # samples of a run
+_FEWEST = 50  # intervals of a past that tells anything
 _FIRST = 5  # samples, from which the force at its beginning is taken
 _SHAKEN = 0.4  # steps of the encoder that count as its noise
 _LARGEST = 1e6  # of the force range; a model that escapes must cost much, not break the solver
@@ -111,6 +112,61 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
+class Past:
+    """What came before a run.
+
+    Attributes:
+        run: the intervals before it.
+        time: at their ends [s].
+    """
+
+    run: Run
+    time: Array
+
+    def motion(self, cutoff: float) -> Motion:
+        """The measured motion, smoothed at ``cutoff`` [rad/s]; that of the last one is kept."""
+        last = self._motions.get("last")  # taken and put back as one: several threads ask at once
+        if last is None or last[0] != cutoff:
+            last = cutoff, _motion(self.run, cutoff)
+            self._motions["last"] = last
+        return last[1]
+
+    @cached_property
+    def raw_motion(self) -> Motion:
+        """The measured motion, as the encoder gives it."""
+        return _motion(self.run, math.inf)
+
+    @cached_property
+    def _motions(self) -> dict[str, tuple[float, Motion]]:
+        return {}
+
+
+def along(
+    model: Model,
+    run: Run,
+    time: Array,
+    motion: Motion,
+    velocity: Array,
+    states: tuple[Array, Array],
+    extra: Term | None = None,
+) -> Array:
+    """The force [F] that ``model``, with the term ``extra``, needs along the positions of ``motion``, shape ``(n,)``.
+
+    It has the ``velocity`` [x/s]; its inner ``states`` are led on in place.
+    """
+    universe = universe_of(model)
+    values = universe.values(model)
+    if extra is not None:
+        universe.put(values, extra)
+    needed, friction = np.empty_like(velocity), np.empty_like(velocity)
+    universe.loops.predict(
+        values, time - 0.5 * motion.step, motion.position, velocity, motion.acceleration,
+        motion.step, run.load, run.temperature, *states, needed, friction,
+    )  # fmt: skip
+    return needed
+
+
+@dataclass(frozen=True, eq=False)
 class Track:
     """Recordings to follow, and how.
 
@@ -122,8 +178,9 @@ class Track:
         mass: by which being behind becomes a force [F s^2/x].
         noise: of the position for each run [x].
         sizes: typical size of a linear parameter by its dimension, for those that are near zero.
-        lead: intervals at the beginning of each run that come before the part that counts; models that remember are led
-            through them, so that they remember what there was.
+        lead: intervals at the beginning of each run that come before the part that counts, so that a model's states are those
+            of the axis there.
+        past: what came before each run, if it is a part of one: models that remember for longer are led along it.
     """
 
     runs: tuple[Run, ...]
@@ -134,6 +191,7 @@ class Track:
     noise: tuple[float, ...]
     sizes: Mapping[str, float]
     lead: tuple[int, ...]
+    past: tuple[Past | None, ...]
 
     @classmethod
     def of(cls, records: Sequence[Record], bandwidth: float, model: Model) -> Track:
@@ -152,23 +210,39 @@ class Track:
                 number.append(k)
                 noise.append(max(noise_of(run.position), _SHAKEN * resolution(run.position)))
         mass = model.total_inertia
-        return cls(tuple(runs), tuple(time), tuple(number), bandwidth, mass, tuple(noise), _sizes(runs, mass), (0,) * len(runs))
+        return cls(
+            tuple(runs),
+            tuple(time),
+            tuple(number),
+            bandwidth,
+            mass,
+            tuple(noise),
+            _sizes(runs, mass),
+            (0,) * len(runs),
+            (None,) * len(runs),
+        )
 
     def parts(self, spans: Sequence[tuple[int, int, int]]) -> Track:
         """The parts of the recordings in ``spans``: run, first and last interval (exclusive) of each."""
-        runs, time, lead = [], [], []
+        runs, time, leads, pasts = [], [], [], []
         for k, first, last in spans:
-            before = min(first, math.ceil(_FORGOTTEN / self.runs[k].sample_time))
-            runs.append(self.runs[k].part(first - before, last))
-            time.append(self.time[k][first - before : last])
-            lead.append(before)
+            run, h = self.runs[k], self.runs[k].sample_time
+            lead = min(first, math.ceil(_OVER / h))
+            begin = first - lead
+            before = min(begin, math.ceil((_FORGOTTEN - _OVER) / h))
+            runs.append(run.part(begin, last))
+            time.append(self.time[k][begin:last])
+            leads.append(lead)
+            span = slice(begin - before, begin)
+            pasts.append(Past(run.part(span.start, span.stop), self.time[k][span]) if before > _FEWEST else None)
         return replace(
             self,
             runs=tuple(runs),
             time=tuple(time),
             record=tuple(self.record[k] for k, _, _ in spans),
             noise=tuple(self.noise[k] for k, _, _ in spans),
-            lead=tuple(lead),
+            lead=tuple(leads),
+            past=tuple(pasts),
         )
 
     @property
@@ -197,13 +271,11 @@ class Track:
         return max(math.ceil(_SETTLING / (self.bandwidth * self.runs[k].sample_time)), 20)
 
     def _first(self, model: Model, k: int) -> int:
-        """Interval of run ``k`` at which ``model`` has to begin so that it knows all it must where it counts."""
-        if any(held.effect.n_memory and held.effect.command is None for held in model.terms):
+        """Interval of run ``k`` at which ``model`` has to begin, to be where the axis is when it counts."""
+        remembers = model.has_slip_dynamics or any(held.effect.n_memory for held in model.terms)
+        if remembers or model.plant is PLANTS[model.plant.id].driven:
             return 0
-        run_in = self._settled(k)
-        if model.has_command_path or model.has_slip_dynamics or model.plant is PLANTS[model.plant.id].driven:
-            run_in = max(run_in, math.ceil(_OVER / self.runs[k].sample_time))
-        return max(self.lead[k] - run_in, 0)
+        return max(self.lead[k] - self._settled(k), 0)
 
     def joined(self, of_run: Sequence[Array]) -> Array:
         """Signals with one value per interval of each run, without the settling, joined, shape ``(n,)``."""
@@ -297,13 +369,8 @@ class Track:
 
     def _along(self, model: Model, k: int, motion: Motion, velocity: Array) -> Array:
         """The force [F] along the positions of ``motion`` with ``velocity`` [x/s], shape ``(n,)``."""
-        universe, run = universe_of(model), self.runs[k]
-        given, friction = np.empty_like(velocity), np.empty_like(velocity)
-        universe.loops.predict(
-            universe.values(model), self.time[k] - 0.5 * motion.step, motion.position, velocity, motion.acceleration,
-            motion.step, run.load, run.temperature, *self.inner_states(model, k, float(motion.velocity[0])), given, friction,
-        )  # fmt: skip
-        return given
+        states = self.inner_states(model, k, float(motion.velocity[0]))
+        return along(model, self.runs[k], self.time[k], motion, velocity, states)
 
     def _rest(self, k: int) -> float:
         """Speed [x/s] below which the noise of run ``k`` doesn't tell motion from rest."""
@@ -318,19 +385,11 @@ class Track:
 
     def needed(self, model: Model, extra: Term | None = None) -> Array:
         """As :meth:`residual`, by the force that ``model``, with the term ``extra``, needs along the measured motion [F]."""
-        universe = universe_of(model)
-        values = universe.values(model)
-        if extra is not None:
-            universe.put(values, extra)
         motion = self.raw_motion if model.has_slip_dynamics else self.motion
         found = []
         for k, (run, time, each, given) in enumerate(zip(self.runs, self.time, motion, self._applied(model), strict=True)):
-            effort, friction = np.empty_like(time), np.empty_like(time)
-            universe.loops.predict(
-                values, time - 0.5 * each.step, each.position, each.velocity, each.acceleration, each.step, run.load,
-                run.temperature, *self.inner_states(model, k, float(each.velocity[0])), effort, friction,
-            )  # fmt: skip
-            found.append(effort - given)
+            states = self.inner_states(model, k, float(each.velocity[0]))
+            found.append(along(model, run, time, each, each.velocity, states, extra) - given)
         return self._finite(self.seen(found))
 
     def _finite(self, signal: Array) -> Array:
@@ -363,8 +422,15 @@ class Track:
 
     def inner_states(self, model: Model, k: int, velocity: float) -> tuple[Array, Array]:
         """What ``model`` remembers where run ``k`` begins, with ``velocity`` [x/s]; a measured contact is bent by then."""
-        force = float(np.median(self.runs[k].effort[:_FIRST])) if model.plant.led else 0.0
-        return universe_of(model).inner_states(model, velocity, force)
+        past = self.past[k]
+        run = self.runs[k] if past is None else past.run
+        force = float(np.median(run.effort[:_FIRST])) if model.plant.led else 0.0
+        if past is None or not (model.has_slip_dynamics or any(held.effect.n_memory for held in model.terms)):
+            return universe_of(model).inner_states(model, velocity, force)
+        motion = past.raw_motion if model.has_slip_dynamics else past.motion(_SMOOTH * self.bandwidth)
+        states = universe_of(model).inner_states(model, float(motion.velocity[0]), force)
+        along(model, past.run, past.time, motion, motion.velocity, states)
+        return states
 
     def begin(self, k: int, first: int = 0) -> float:
         """Time in its recording at which interval ``first`` of run ``k`` begins [s].
