@@ -161,11 +161,14 @@ def _values(effect: Effect, scales: Scales) -> Iterator[tuple[float, ...]]:
 
 
 def _with_damping(effect: Effect, values: Sequence[float], scales: Scales) -> list[float]:
-    """A spring's damper in proportion to it: a bare one would ring for ever."""
+    """A spring's damper in proportion to it: a bare one would ring for ever.
+
+    Stops that hardly ring let a fit find their stiffness: what rings, rings at the wrong times until that is known.
+    """
     result = list(values)
     names = [parameter.dimension for parameter in effect.parameters]
     if "F/x" in names and "F s/x" in names and effect.force is None:
-        share = 0.5 if effect.slip is not None else 0.05
+        share = 0.5 if effect.slip is not None else 0.3 if effect.play is not None else 0.05
         result[names.index("F s/x")] = 2.0 * share * math.sqrt(result[names.index("F/x")] * 0.25 * scales.mass)
     return result
 

@@ -53,6 +53,9 @@ _FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is mis
 _MANY = 3  # effects at once that still leave something are more likely to have stood in for one
 _SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, something unknown remains however little is known of the floor
+_TWINS = 5
+_AS_FAST = 8  # iterations of a fit by a faster observer
+_DECIDED = 0.5  # of what the refitted nominal model lacks: with more, twins of the grown one say nothing
 _FIRST_FIT = 6  # iterations, by which starts are compared
 _MOSTLY = 0.5  # of what a grown model leaves, for a signature to say what that is
 _STANDS_OUT = 10.0  # times the floor
@@ -105,7 +108,7 @@ def diagnose(
         growth, note = confirmed(parts, growth)
         corrected.append(note)
     tell("judging on the validation recordings")
-    return _concluded(train, validation, nominal, checks, corrected, searched, growth)
+    return _concluded(validation, nominal, checks, corrected, tracks, searched, growth)
 
 
 def refit_noe(model: Model, train: Sequence[Record], validation: Sequence[Record], bandwidth: float) -> float:
@@ -209,26 +212,23 @@ def _tracks(train: Sequence[Record], start: Model) -> list[Track]:
 
 
 def _concluded(
-    train: Sequence[Record],
     validation: Sequence[Record],
     nominal: Model,
     checks: Sequence[Check],
     corrected: Sequence[str],
-    tracks: Sequence[Track],
+    whole: Sequence[Track],
+    searched: Sequence[Track],
     growth: Growth,
 ) -> Diagnosis:
     track = growth.track
-    begin, end = growth.begin.fit.model, _with_errors(track, growth.end.fit)
-    held = _shown(validation, track, begin, growth.beyond > 0.0)
+    held = _shown(validation, track, growth.begin.fit.model, growth.beyond > 0.0)
+    begin_fit, end_fit = _as_fast(whole, held, growth)
+    begin, end = begin_fit.model, _with_errors(track, end_fit)
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
     spread = _spread(held)
-    # A grown model that sticks and slips where the axis doesn't has twins that say nothing: the quieter ones count.
-    floors = [
-        [held.residual(model, twin) for twin in twins(held, model, 3)] for model in ([end, begin] if growth.steps else [end])
-    ]
-    floor = min(floors, key=lambda each: sum(float(one @ one) for one in each))
+    floor = _floor(held, begin, end, left["refit"])
     noe = {name: 100.0 * float(each @ each) / spread for name, each in left.items()}
-    noise_floor = 100.0 * float(np.mean([each @ each for each in floor])) / spread
+    noise_floor = 100.0 * _mean_square(floor) / spread
     scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
     missing = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
     # What the recordings held back don't show has been chance, or has been over before they were made.
@@ -254,7 +254,7 @@ def _concluded(
     # What is more likely wrong than right is no explanation either.
     doubtful = all(each.confidence < AS_LIKELY for each in findings)
     if missing and (rest > _SIGNED or doubtful or far_off or growth.beyond > 0.0):
-        likely, of_all = _signature_of(tracks, growth, rest)
+        likely, of_all = _signature_of(searched, growth, rest)
         # Where one signature explains more than several effects do together, these have only stood in for it.
         stand_in = of_all and len(findings) > 1
     most = UNEXPLAINED if len(findings) < _MANY else _SIGNED
@@ -281,7 +281,7 @@ def _concluded(
         mismatch=missing,
         where=everything,
         checks=tuple(checks),
-        nominal=_nominal_part(nominal, growth.begin.fit),
+        nominal=_nominal_part(nominal, begin_fit),
         findings=tuple(findings),
         rejected=_rejected(growth, begin, scales_of(track)),
         validation=scored,
@@ -350,9 +350,41 @@ def _shown(validation: Sequence[Record], track: Track, begin: Model, as_track: b
             raise DiagnosisError(validation[0].source, "has no valid part of 200 samples", "record for longer")
         left = held.residual(begin)
         floor = [held.residual(begin, twin) for twin in twins(held, begin, 2)]
-        if bandwidth <= track.bandwidth or float(left @ left) > 3.0 * float(np.mean([each @ each for each in floor])):
+        if bandwidth <= track.bandwidth or float(left @ left) > 3.0 * _mean_square(floor):
             break
     return held
+
+
+def _as_fast(whole: Sequence[Track], held: Track, growth: Growth) -> tuple[Fit, Fit]:
+    """The refitted nominal and the grown model, as an observer as fast as that of the recordings held back has them.
+
+    What a slow observer can't tell from nothing, such as how stops are damped, shows to a fast one.
+    """
+    fits = growth.begin.fit, growth.end.fit
+    track = next((each for each in whole if each.bandwidth == held.bandwidth), None)
+    if track is None or held.bandwidth <= growth.track.bandwidth:
+        return fits
+    bounds = [bounds_of(fit.model, scales_of(track)) for fit in fits]
+    begin, end = (track.fit(fit.model, fit.names, _AS_FAST, among) for fit, among in zip(fits, bounds, strict=True))
+    return begin, end if growth.steps else begin
+
+
+def _floor(held: Track, begin: Model, end: Model, lacking: Array) -> list[Array]:
+    """What twins of the grown model ``end`` leave [F], shape ``(n,)`` each.
+
+    Where blows and sticking are decided by the noise, that is more than twins of the refitted nominal ``begin`` leave, and no
+    physics left out. But where it comes near all that this lacks, the model sticks and slips where the axis doesn't, and its
+    twins say nothing: then the quieter ones count.
+    """
+    own = [held.residual(end, twin) for twin in twins(held, end, _TWINS)]
+    if end is begin or float(np.median([each @ each for each in own])) < _DECIDED * float(lacking @ lacking):
+        return own
+    return min(own, [held.residual(begin, twin) for twin in twins(held, begin, _TWINS)], key=_mean_square)
+
+
+def _mean_square(residuals: Sequence[Array]) -> float:
+    """Mean over ``residuals`` of their sums of squares [F^2]."""
+    return float(np.mean([each @ each for each in residuals]))
 
 
 def _with_errors(track: Track, fit: Fit) -> Model:
@@ -433,7 +465,7 @@ def _difference(fast: Track, before: Model, after: Model) -> list[Array]:
 
 def _left(held: Track, residual: Array, floor: Sequence[Array]) -> list[Array]:
     """Energy of the rest above what twins leave at the same speed [F^2], per run, one value per interval."""
-    level = float(np.mean([each @ each for each in floor])) / residual.shape[0]
+    level = _mean_square(floor) / residual.shape[0]
     energy = []
     for run, part in zip(held.runs, held.padded(residual), strict=True):
         h = run.sample_time

@@ -163,7 +163,7 @@ def shaken(track: Track, fit: Fit, bounds: Bounds, floor: float) -> Fit:
         if p.declaration.positive:
             low[k] = max(low[k], 1e-3 * abs(float(fit.model.values[k])))
     # What a recording tells well anyway must not be drawn far: it would drown what the others do.
-    spread = np.array([_WELL_KNOWN if "." not in name else 1.0 for name in fit.names])
+    spread = np.array([1.0 if "." in name or name == "load_share" else _WELL_KNOWN for name in fit.names])
     best, left = fit, float(fit.residual @ fit.residual)
     for _ in range(_ROUNDS):
         before = left

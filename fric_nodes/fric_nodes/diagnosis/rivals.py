@@ -40,6 +40,7 @@ _NEARLY = 0.5  # of what the best takes off: another that does is fitted, too,
 _FITTED = 4  # and at most because they lack least where their fit begins,
 _LAWS = 3  # of them laws of one effect
 _REFINED = 2  # the best, with more iterations
+_SHARES = (0.5, 0.3, 0.7)  # of the mass behind a transmission, from which fits begin
 _IN_REACH = 0.6  # of what is to be beaten, a rough fit takes off before it is worth more iterations
 _ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
@@ -99,8 +100,7 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
     fitted: list[Rival] = []
     much = state.floor + max(_ROUGH * state.excess, OF_FLOOR * state.floor)
     for offer, beginning in _offered(track, state, found, scales, to_beat > much).items():
-        model = beginning.model
-        fit = track.fit(model, free_names(model), 4, bounds_of(model, scales))
+        fit = _first_fit(track, state, beginning.model, scales)
         fitted.append(_rival(track, state, offer, fit, found))
     fitted = _side_by_side(track, fitted, found.unpaid)
     for k, rival in enumerate(fitted[:_REFINED]):
@@ -113,6 +113,18 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         fitted[k] = _rival(track, state, rival.offer, fit, found)
     fitted = _side_by_side(track, fitted, found.unpaid)
     return [*(_shaped(track, state, rival, found, scales) for rival in fitted[:1]), *fitted[1:]]
+
+
+def _first_fit(track: Track, state: State, model: Model, scales: Scales) -> Fit:
+    """``model`` fitted roughly; where a transmission comes, from several shares of the mass behind it.
+
+    Between two bodies all else depends on that share, and what is left is no smooth function of it.
+    """
+    starts = [model]
+    if is_driven(model) and not is_driven(state.fit.model):
+        starts = [model.with_value("load_share", share) for share in _SHARES]
+    fits = [track.fit(start, free_names(start), 4, bounds_of(start, scales)) for start in starts]
+    return min(fits, key=lambda fit: float(fit.residual @ fit.residual))
 
 
 def _shaped(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> Rival:
