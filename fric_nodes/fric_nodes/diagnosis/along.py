@@ -43,6 +43,17 @@ class Along:
         rest = max(_REST * float(np.quantile(speed, 0.98)), 4.0 * max(track.noise) * track.bandwidth)
         self.moving = track.joined([(np.abs(each.velocity) > rest).astype(np.float64) for each in track.motion]) > 0.5
 
+    @property
+    def bandwidth(self) -> float:
+        """Of the observer [rad/s]."""
+        return self._track.bandwidth
+
+    def seen(self, name: str) -> Array:
+        """The signal ``name`` of the measured motion, as late as the observer sees a force, where the axis moves."""
+        signals = [np.asarray(getattr(each, name)) for each in self._track.motion]
+        begins = self._track.joined([np.full_like(signal, signal[0]) for signal in signals])
+        return (self._track.seen([signal - signal[0] for signal in signals]) + begins)[self.moving]
+
     def can(self, model: Model) -> bool:
         """True for models whose force the motion at the sensor tells."""
         at_sensor = PLANTS[model.plant.id].driven is not model.plant and not model.plant.led

@@ -7,7 +7,8 @@ its score: the sum over blocks of the squares that remain. Only sums of products
 block), so that every candidate, and every pair of them, costs a few small systems of equations.
 
 Grids of many values (the period of a ripple, the place of a bump, the age of a contact) are narrowed beforehand by columns that
-need no observer: the force that the term adds along the measured motion (:mod:`fric_nodes.diagnosis.along`).
+need no observer: the force that the term adds along the measured motion (:mod:`fric_nodes.diagnosis.along`). Periods finer than
+any grid are taken from the spectrum over position (:mod:`fric_nodes.diagnosis.fine`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from ..record import Array, Index
 from ..threads import mapped
 from .along import Along
 from .candidates import Candidate
+from .fine import fine_periods
 from .track import Fit, Track
 
 __all__ = ["Column", "Gram", "Promise", "Screening", "Tried", "blocks_of", "columns_of", "restraint", "screen"]
@@ -32,6 +34,8 @@ _TINY = 1e-10
 _VISIBLE = 1e-12  # of what is missing, the least that a trial changes
 _OWN = 0.02  # of a column, what the fit's own parameters must not be able to do
 _PAIRS = 5
+_SEEN = 1.5  # times its bandwidth: faster ones an observer hardly sees
+_SLOWLY = 0.25  # of the motion
 _AT_ONCE = 400  # sets of columns whose equations are solved together
 
 
@@ -166,9 +170,25 @@ class Promise:
         effect = candidate.effect
         if not self._able or effect.neutral is None or effect.command is not None:
             return list(candidate.trials)
-        promise = [self._of(trial) for trial in candidate.trials]
+        trials = [*candidate.trials, *self._fine(candidate)]
+        promise = [self._of(trial) for trial in trials]
         order = np.argsort(promise)[::-1][:_KEPT]
-        return [candidate.trials[k] for k in order if promise[k] > 0.0]
+        return [trials[k] for k in order if promise[k] > 0.0]
+
+    def _fine(self, candidate: Candidate) -> list[Term]:
+        """Trials of periods finer than those of ``candidate``, where what is missing has such."""
+        names = [p.name for p in candidate.effect.parameters]
+        if "period" not in names:
+            return []
+        at = names.index("period")
+        position, velocity = (self._along.seen(name)[self._rows] for name in ("position", "velocity"))
+        travel, finest = float(np.ptp(position)), min(trial.values[at] for trial in candidate.trials)
+        # Slowly moved over, it comes more slowly, and the observer sees it.
+        seen = _SEEN * self._along.bandwidth / (2.0 * np.pi * float(np.quantile(np.abs(velocity), _SLOWLY)))
+        missing = self._missing * np.sign(velocity) if candidate.effect.level is not None else self._missing
+        periods = fine_periods(position, missing, travel / finest, seen * travel)
+        given = candidate.trials[0].values
+        return [Term(candidate.effect, (*given[:at], period, *given[at + 1 :])) for period in periods]
 
     def _of(self, trial: Term) -> float:
         """What the trial takes off the sum of squares along the motion [F^2]."""

@@ -245,6 +245,12 @@ class Track:
             past=tuple(pasts),
         )
 
+    @cached_property
+    def travel(self) -> float:
+        """From the lowest to the highest position of all runs [x]."""
+        highest, lowest = (which([which(run.position) for run in self.runs]) for which in (np.max, np.min))
+        return max(float(highest - lowest), 1e-300)
+
     @property
     def n_samples(self) -> int:
         """Intervals that count."""
@@ -459,11 +465,15 @@ class Track:
     def scale(self, model: Model, names: Sequence[str]) -> Array:
         """Size of each of the parameters ``names``.
 
-        A parameter near zero gets that of what would matter, or it could never leave.
+        A parameter near zero gets that of what would matter, or it could never leave; a period that of one cycle more or less
+        over the travel.
         """
         values, declared = model.values, [parameter.declaration for parameter in model.parameters()]
         index = [model.names.index(name) for name in names]
         scale = np.array([max(abs(values[k]), self.sizes.get(declared[k].dimension, 0.0)) for k in index])
+        for place, k in enumerate(index):
+            if declared[k].name == "period":
+                scale[place] = min(abs(values[k]), values[k] ** 2 / self.travel)
         scale[scale == 0.0] = 1.0
         return scale
 
