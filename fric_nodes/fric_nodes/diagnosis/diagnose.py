@@ -58,6 +58,7 @@ _AS_FAST = 8  # iterations of a fit by a faster observer
 _DECIDED = 0.5  # of what the refitted nominal model lacks: with more, twins of the grown one say nothing
 _FIRST_FIT = 6  # iterations, by which starts are compared
 _MOSTLY = 0.5  # of what a grown model leaves, for a signature to say what that is
+_LEFT_UNSEEN = 0.05  # of what is missing in the recordings held back: what has the right structure leaves less there
 _STANDS_OUT = 10.0  # times the floor
 _LOCATING = 600.0  # [rad/s], for spans of time
 _LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of the physics
@@ -259,7 +260,9 @@ def _concluded(
         stand_in = of_all and len(findings) > 1
     most = UNEXPLAINED if len(findings) < _MANY else _SIGNED
     unsure = _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300)
-    unknown = missing and (rest > min(most + unsure, _HARDLY) or doubtful or stand_in or far_off or growth.beyond > 0.0)
+    unseen_unsure = _FLOOR_UNSURE * noise_floor / max(scored.noe_refit - noise_floor, 1e-300)
+    left_over = rest > min(most + unsure, _HARDLY) or seen_rest > min(_LEFT_UNSEEN + unseen_unsure, _HARDLY)
+    unknown = missing and (left_over or doubtful or stand_in or far_off or growth.beyond > 0.0)
     unexplained = Unexplained(max(rest, growth.beyond), None)
     remains = None
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
