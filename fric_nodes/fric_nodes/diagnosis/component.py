@@ -67,7 +67,7 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
     Args:
         track: the recordings.
         fit: whose residual is to be explained.
-        tried: effects of the registry with what they leave, if they are to take part.
+        tried: effects of the registry with what they leave, if they are to take part; those in which force is linear do.
     """
     missing = fit.residual
     stride = max(missing.shape[0] // _ROWS, 1)
@@ -83,7 +83,8 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
         signature = _marked(component, title, left / max(alone, 1e-300), n, independent)
         if title not in found or signature.evidence < found[title].evidence:
             found[title] = signature
-    best = min(tried, key=lambda each: each.left, default=None)
+    # A limit or a gap promises at first order what it doesn't keep.
+    best = min((each for each in tried if each.column.amplitudes), key=lambda each: each.left, default=None)
     if best is not None:
         effect = best.column.term.effect
         left = best.left / max(best.left + best.gain, 1e-300)

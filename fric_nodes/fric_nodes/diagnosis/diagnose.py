@@ -259,10 +259,11 @@ def _concluded(
         # Where one signature explains more than several effects do together, these have only stood in for it.
         stand_in = of_all and len(findings) > 1
     most = UNEXPLAINED if len(findings) < _MANY else _SIGNED
-    unsure = _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300)
-    unseen_unsure = _FLOOR_UNSURE * noise_floor / max(scored.noe_refit - noise_floor, 1e-300)
-    left_over = rest > min(most + unsure, _HARDLY) or seen_rest > min(_LEFT_UNSEEN + unseen_unsure, _HARDLY)
-    unknown = missing and (left_over or doubtful or stand_in or far_off or growth.beyond > 0.0)
+    # How well both shares are known depends on how far what is missing stands out, there and here.
+    here = min(most + _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300), _HARDLY)
+    there = min(_LEFT_UNSEEN + _FLOOR_UNSURE * noise_floor / max(scored.noe_refit - noise_floor, 1e-300), _HARDLY)
+    much = rest > here or seen_rest > there
+    unknown = missing and (much or doubtful or stand_in or far_off or growth.beyond > 0.0)
     unexplained = Unexplained(max(rest, growth.beyond), None)
     remains = None
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
