@@ -264,9 +264,8 @@ class Track:
     @property
     def independent(self) -> float:
         """About how many independent numbers a residual holds: it is low-passed."""
-        return (
-            0.5 * self.bandwidth * float(sum(np.sum(run.step[lead:]) for run, lead in zip(self.runs, self.lead, strict=True)))
-        )
+        last = [float(np.sum(run.step[lead:])) for run, lead in zip(self.runs, self.lead, strict=True)]
+        return 0.5 * self.bandwidth * sum(last)
 
     def _settling(self, k: int) -> int:
         """Intervals of run ``k`` that don't count: those that lead to it, or until the observer has settled."""
@@ -278,8 +277,7 @@ class Track:
 
     def _first(self, model: Model, k: int) -> int:
         """Interval of run ``k`` at which ``model`` has to begin, to be where the axis is when it counts."""
-        remembers = model.has_slip_dynamics or any(held.effect.n_memory for held in model.terms)
-        if remembers or model.plant is PLANTS[model.plant.id].driven:
+        if _remembers(model) or model.plant is PLANTS[model.plant.id].driven:
             return 0
         return max(self.lead[k] - self._settled(k), 0)
 
@@ -431,7 +429,7 @@ class Track:
         past = self.past[k]
         run = self.runs[k] if past is None else past.run
         force = float(np.median(run.effort[:_FIRST])) if model.plant.led else 0.0
-        if past is None or not (model.has_slip_dynamics or any(held.effect.n_memory for held in model.terms)):
+        if past is None or not _remembers(model):
             return universe_of(model).inner_states(model, velocity, force)
         motion = past.raw_motion if model.has_slip_dynamics else past.motion(_SMOOTH * self.bandwidth)
         states = universe_of(model).inner_states(model, float(motion.velocity[0]), force)
@@ -563,6 +561,11 @@ def fitted_values(
 
     answer = minimise(lambda point: residual(at(point)), values[index] / scale, lower / scale, upper / scale, **how)
     return at(answer.point), answer
+
+
+def _remembers(model: Model) -> bool:
+    """True for a model whose force hangs on what was before."""
+    return model.has_slip_dynamics or any(held.effect.n_memory for held in model.terms)
 
 
 @dataclass(frozen=True, eq=False)
