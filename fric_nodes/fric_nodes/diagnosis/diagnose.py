@@ -187,12 +187,13 @@ def _corrected(
 def _started(nominal: Model, train: Sequence[Record], as_given: bool = False) -> tuple[list[Track], Model]:
     """The recordings, followed, and the nominal structure with values that a fit can start from: the given or better ones."""
     starts = [replace(nominal, standard_errors={})]
-    try:
-        found = METHODS["inverse-dynamics"].fit(starts[0], list(train), Options()).model
-        if np.all(np.isfinite(found.values)) and not as_given:
-            starts.insert(0, found)
-    except (IdentificationError, np.linalg.LinAlgError):
-        pass
+    if not as_given:
+        try:
+            found = METHODS["inverse-dynamics"].fit(starts[0], list(train), Options()).model
+            if np.all(np.isfinite(found.values)):
+                starts.insert(0, found)
+        except (IdentificationError, np.linalg.LinAlgError):
+            pass
     tracks = _tracks(train, starts[0])
     bounds = bounds_of(starts[0], scales_of(tracks[0]))
     fits = [tracks[0].fit(start, free_names(start), _FIRST_FIT, bounds) for start in starts]
@@ -225,9 +226,8 @@ def _concluded(
     searched: Sequence[Track],
     growth: Growth,
 ) -> Diagnosis:
-    track = growth.track
-    held = _shown(validation, track, growth.begin.fit.model, growth.beyond > 0.0)
-    begin_fit, end_fit = _as_fast(whole, held, growth)
+    held = _shown(validation, growth.track, growth.begin.fit.model, growth.beyond > 0.0)
+    track, begin_fit, end_fit = _as_fast(whole, held, growth)
     begin, end = begin_fit.model, _with_errors(track, end_fit)
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
     spread = _spread(held)
@@ -363,18 +363,18 @@ def _shown(validation: Sequence[Record], track: Track, begin: Model, as_track: b
     return held
 
 
-def _as_fast(whole: Sequence[Track], held: Track, growth: Growth) -> tuple[Fit, Fit]:
-    """The refitted nominal and the grown model, as an observer as fast as that of the recordings held back has them.
+def _as_fast(whole: Sequence[Track], held: Track, growth: Growth) -> tuple[Track, Fit, Fit]:
+    """A track as fast as that of the recordings held back, and the refitted nominal and the grown model fitted to it.
 
     What a slow observer can't tell from nothing, such as how stops are damped, shows to a fast one.
     """
     fits = growth.begin.fit, growth.end.fit
     track = next((each for each in whole if each.bandwidth == held.bandwidth), None)
     if track is None or held.bandwidth <= growth.track.bandwidth:
-        return fits
+        return growth.track, *fits
     bounds = [bounds_of(fit.model, scales_of(track)) for fit in fits]
     begin, end = (track.fit(fit.model, fit.names, _AS_FAST, among) for fit, among in zip(fits, bounds, strict=True))
-    return begin, end if growth.steps else begin
+    return track, begin, end if growth.steps else begin
 
 
 def _floor(held: Track, begin: Model, end: Model, lacking: Array) -> list[Array]:

@@ -118,27 +118,22 @@ class Past:
     Attributes:
         run: the intervals before it.
         time: at their ends [s].
+        cutoff: at which their motion is smoothed [rad/s].
     """
 
     run: Run
     time: Array
+    cutoff: float
 
-    def motion(self, cutoff: float) -> Motion:
-        """The measured motion, smoothed at ``cutoff`` [rad/s]; that of the last one is kept."""
-        last = self._motions.get("last")  # taken and put back as one: several threads ask at once
-        if last is None or last[0] != cutoff:
-            last = cutoff, _motion(self.run, cutoff)
-            self._motions["last"] = last
-        return last[1]
+    @cached_property
+    def motion(self) -> Motion:
+        """The measured motion, smoothed."""
+        return _motion(self.run, self.cutoff)
 
     @cached_property
     def raw_motion(self) -> Motion:
         """The measured motion, as the encoder gives it."""
         return _motion(self.run, math.inf)
-
-    @cached_property
-    def _motions(self) -> dict[str, tuple[float, Motion]]:
-        return {}
 
 
 def along(
@@ -234,7 +229,8 @@ class Track:
             time.append(self.time[k][begin:last])
             leads.append(lead)
             span = slice(begin - before, begin)
-            pasts.append(Past(run.part(span.start, span.stop), self.time[k][span]) if before > _FEWEST else None)
+            past = Past(run.part(span.start, span.stop), self.time[k][span], _SMOOTH * self.bandwidth)
+            pasts.append(past if before > _FEWEST else None)
         return replace(
             self,
             runs=tuple(runs),
@@ -248,8 +244,7 @@ class Track:
     @cached_property
     def travel(self) -> float:
         """From the lowest to the highest position of all runs [x]."""
-        highest, lowest = (which([which(run.position) for run in self.runs]) for which in (np.max, np.min))
-        return max(float(highest - lowest), 1e-300)
+        return max(float(np.ptp(np.concatenate([run.position for run in self.runs]))), 1e-300)
 
     @property
     def n_samples(self) -> int:
@@ -431,7 +426,7 @@ class Track:
         force = float(np.median(run.effort[:_FIRST])) if model.plant.led else 0.0
         if past is None or not _remembers(model):
             return universe_of(model).inner_states(model, velocity, force)
-        motion = past.raw_motion if model.has_slip_dynamics else past.motion(_SMOOTH * self.bandwidth)
+        motion = past.raw_motion if model.has_slip_dynamics else past.motion
         states = universe_of(model).inner_states(model, float(motion.velocity[0]), force)
         along(model, past.run, past.time, motion, motion.velocity, states)
         return states
