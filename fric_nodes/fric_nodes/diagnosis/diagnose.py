@@ -32,7 +32,7 @@ from .component import Signature, agreed, signatures
 from .confidence import AS_LIKELY, UNEXPLAINED, confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, free_names, refit
-from .grow import Growth, grow
+from .grow import Growth, grow, helped
 from .ladder import concluded_by_means, ladder_of
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, Grown, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
@@ -104,8 +104,10 @@ def diagnose(
     if massless:  # at first: beside much that is left out inertia may drown
         tracks, start = _started(nominal, train, as_given=True)
     parts = excerpt(tracks, start)
-    growth = grow(tracks if parts is None else parts.tracks, start, tell)
     searched = list(tracks if parts is None else parts.tracks)
+    growth = grow(searched, start, tell)
+    if growth.beyond > 0.0 or growth.rest > _most_left(growth):
+        growth = helped(searched, growth, tell)
     if parts is not None:
         tell("fitting what was found to all samples")
         growth, note = confirmed(parts, growth)
@@ -226,6 +228,7 @@ def _concluded(
     searched: Sequence[Track],
     growth: Growth,
 ) -> Diagnosis:
+    growth = _unless_worse(validation, whole, growth)
     held = _shown(validation, growth.track, growth.begin.fit.model, growth.beyond > 0.0)
     track, begin_fit, end_fit = _as_fast(whole, held, growth)
     begin, end = begin_fit.model, _with_errors(track, end_fit)
@@ -258,16 +261,16 @@ def _concluded(
     far_off = min(mass_off(mass, end) for mass in (track.mass, nominal.total_inertia)) > FAR_OFF
     # What is more likely wrong than right is no explanation either.
     doubtful = all(each.confidence < AS_LIKELY for each in findings)
-    if missing and (rest > _SIGNED or doubtful or far_off or growth.beyond > 0.0):
-        likely, of_all = _signature_of(searched, growth, rest)
+    plain = growth.unhelped or growth
+    beside = growth.beyond > 0.0 or plain is not growth
+    if missing and (rest > _SIGNED or doubtful or far_off or beside):
+        likely, of_all = _signature_of(searched, plain, max(rest, plain.rest))
         # Where one signature explains more than several effects do together, these have only stood in for it.
         stand_in = of_all and len(findings) > 1
-    most = UNEXPLAINED if len(findings) < _MANY else _SIGNED
     # How well both shares are known depends on how far what is missing stands out, there and here.
-    here = min(most + _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300), _HARDLY)
     there = min(_LEFT_UNSEEN + _FLOOR_UNSURE * noise_floor / max(scored.noe_refit - noise_floor, 1e-300), _HARDLY)
-    much = rest > here or seen_rest > there
-    unknown = missing and (much or doubtful or stand_in or far_off or growth.beyond > 0.0)
+    much = rest > _most_left(growth) or seen_rest > there
+    unknown = missing and (much or doubtful or stand_in or far_off or beside)
     unexplained = Unexplained(max(rest, growth.beyond), None)
     remains = None
     if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
@@ -303,6 +306,22 @@ def _concluded(
         bandwidth=held.bandwidth,
         grown=_grown(growth),
     )
+
+
+def _most_left(growth: Growth) -> float:
+    """Share of what is missing that an explanation leaves at most, as well as both are known."""
+    most = UNEXPLAINED if len(growth.steps) < _MANY else _SIGNED
+    return min(most + _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300), _HARDLY)
+
+
+def _unless_worse(validation: Sequence[Record], whole: Sequence[Track], growth: Growth) -> Growth:
+    """``growth`` without the terms that only help, where the recordings held back speak against them."""
+    plain = growth.unhelped
+    if plain is None:
+        return growth
+    held = _shown(validation, growth.track, growth.begin.fit.model, growth.beyond > 0.0)
+    left = [held.residual(_as_fast(whole, held, each)[2].model) for each in (growth, plain)]
+    return growth if float(left[0] @ left[0]) < float(left[1] @ left[1]) else plain
 
 
 def _grown(growth: Growth) -> tuple[Grown, ...]:

@@ -146,4 +146,5 @@ def confirmed(found: Excerpt, growth: Growth) -> tuple[Growth, str]:
     text = found.text
     if growth.steps:
         text += f"; of what is missing it leaves {_share(left)} there, {_share(here)} in the excerpt"
-    return replace(growth, track=track, begin=begin, end=end), text
+    plain = None if growth.unhelped is None else confirmed(found, growth.unhelped)[0]
+    return replace(growth, track=track, begin=begin, end=end, unhelped=plain), text

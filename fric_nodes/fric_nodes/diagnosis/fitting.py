@@ -95,9 +95,10 @@ def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
 def unseen(track: Track, fit: Fit, residual: Array) -> float:
     """Sum of squares of ``residual`` on blocks left out of the fit in turn [F^2].
 
-    It is reckoned at first order, whose fault is what is more than twice what is left where it was fitted.
+    It is reckoned at first order, whose fault is what is more than twice what is left where it was fitted. What a bound holds
+    stays: else a surplus that comes out at nothing would be credited with what a shortfall would explain.
     """
-    columns = np.concatenate([residual[:, None], fit.jacobian], axis=1)
+    columns = np.concatenate([residual[:, None], fit.jacobian[:, fit.solution.free]], axis=1)
     held = np.full(columns.shape[1], restraint(track, fit))
     gram = Gram(columns, blocks_of(track, columns.shape[0]), held)
     return min(gram.left(0, range(1, columns.shape[1])), _INFLATION * float(residual @ residual))

@@ -16,12 +16,12 @@ from ..model import Model
 from .candidates import candidates, scales_of
 from .fitting import NOTHING, State, best_track, refit
 from .laws import with_best_laws
-from .rivals import BY_CHANCE, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
+from .rivals import BY_CHANCE, OF_EXCESS, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
 from .screen import Screening, Tried, screen
-from .settle import FLOOR_KNOWN, Settled, Step, exchanged, merged, settled
+from .settle import FLOOR_KNOWN, Settled, Step, audit, exchanged, merged, settled
 from .track import Track
 
-__all__ = ["Growth", "grow"]
+__all__ = ["Growth", "grow", "helped"]
 
 _TO_COMPARE = 2  # terms, after which another beginning is tried
 _OTHER_BEGINNINGS = 2
@@ -36,6 +36,8 @@ _ALIKE = 0.8  # of what the best takes off: another that does tells that the cau
 _TIED = 0.05  # of the floor: no observer tells two that differ by less
 _MUCH = 0.3  # of what is missing: with more left, another observer may see what it is
 _HARDLY = 0.5  # of what is missing: with more left, it is hardly explained
+_HELPS = 0.05  # of what is missing, a term has to take off to be told of beside something unknown
+_MOST_HELPING = 7  # terms then, with those that were there
 _TRIED = 0.15  # of the floor: with more left above it, something is fitted in full, whatever it promises at first order
 
 
@@ -54,6 +56,7 @@ class Growth:
         beginnings: what the first term was chosen from, the best first.
         ended: False where more terms may help.
         beyond: share of what is missing to a faster observer that nothing explains; 0 where the fastest that sees it was kept.
+        unhelped: the same before terms came that only help beside something unknown; None where none did.
     """
 
     track: Track
@@ -66,6 +69,7 @@ class Growth:
     beginnings: tuple[Rival, ...] = field(default=())
     ended: bool = False
     beyond: float = 0.0
+    unhelped: Growth | None = None
 
     @property
     def price(self) -> float:
@@ -100,6 +104,37 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
         if other.steps and other.rest < min(best.rest, _HARDLY):
             return replace(other, beyond=best.rest)
     return best
+
+
+def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:
+    """``growth`` and the terms that help beside something unknown; ``growth`` itself where none does.
+
+    On a real machine many small effects may add up to what stays. None of them is an explanation, so that the verdict is not
+    theirs; but each has to take its part off blocks that it has not seen, and all of them together off the other half.
+
+    Args:
+        tracks: those that ``growth`` was grown on.
+        growth: that leaves more than an explanation does.
+        tell: told what comes.
+    """
+    tell("looking for what helps beside it")
+    track = growth.track
+    for each in sorted(tracks, key=lambda one: -one.bandwidth):
+        begin = refit(each, growth.begin.fit.model)
+        if each.bandwidth <= track.bandwidth or begin.excess > _FAINTLY * begin.floor:
+            track = each
+            break
+    start = replace(growth, beyond=0.0)
+    if track is not growth.track:
+        begin, end = (refit(track, state.fit.model) for state in (growth.begin, growth.end))
+        rest = audit(track, begin.fit.model, end.fit.model) if growth.steps else 1.0
+        start = replace(start, track=track, begin=begin, end=end, rest=rest)
+    raw = _added([track], start, None, tell, most=_MOST_HELPING, least=_HELPS)
+    done = settled(track, raw.begin, raw.end, list(raw.steps))
+    if len(done.steps) <= len(growth.steps) or done.rest >= start.rest:
+        return growth
+    gone = (*growth.rejected, *done.gone)
+    return replace(raw, begin=done.begin, end=done.state, steps=done.steps, rest=done.rest, rejected=gone, unhelped=growth)
 
 
 def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth:
@@ -211,11 +246,16 @@ def _settled(growth: Growth) -> Growth:
 
 
 def _added(
-    tracks: Sequence[Track], growth: Growth, first: Rival | None, tell: Callable[[str], None], most: int = _MOST_TERMS
+    tracks: Sequence[Track],
+    growth: Growth,
+    first: Rival | None,
+    tell: Callable[[str], None],
+    most: int = _MOST_TERMS,
+    least: float = OF_EXCESS,
 ) -> Growth:
     """``growth`` and the terms that come to it while they help, ``first`` before others, or until they are ``most``.
 
-    What it leaves on unseen halves is not known yet.
+    Each takes off ``least`` of what is missing. What it leaves on unseen halves is not known yet.
     """
     track, begin, state = growth.track, growth.begin, growth.end
     scales = scales_of(track)
@@ -228,9 +268,9 @@ def _added(
         else:
             found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
             last = found.tried
-            if state.excess < _TRIED * state.floor and not worth(state, found.tried):
+            if state.excess < _TRIED * state.floor and not worth(state, found.tried, least):
                 break
-            rivals = [rival for rival in rivals_of(track, state, found, scales) if earns(state, rival.left, rival.offer)]
+            rivals = [rival for rival in rivals_of(track, state, found, scales) if earns(state, rival.left, rival.offer, least)]
             if not rivals:
                 break
             rivals = _told_apart(tracks, track, state, rivals)

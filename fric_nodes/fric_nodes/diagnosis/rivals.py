@@ -18,6 +18,7 @@ from .track import Fit, Track
 __all__ = [
     "BY_CHANCE",
     "FAR_OFF",
+    "OF_EXCESS",
     "OF_FLOOR",
     "PER_PARAMETER",
     "Rival",
@@ -44,7 +45,7 @@ _SHARES = (0.5, 0.3, 0.7)  # of the mass behind a transmission, from which fits 
 _IN_REACH = 0.6  # of what is to be beaten, a rough fit takes off before it is worth more iterations
 _ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
-_OF_EXCESS = 0.12  # and of what is missing: less is no explanation
+OF_EXCESS = 0.12  # and of what is missing: less is no explanation
 BY_CHANCE = 6.0  # and times what candidates take off twins
 
 
@@ -160,7 +161,7 @@ def _offered(track: Track, state: State, found: Screening, scales: Scales, far: 
     begins = _begun(track, state.fit, [(each,) for each in (*found.tried, *found.laws)], scales, along)
     lacks = float(state.fit.residual @ state.fit.residual)
     most = found.tried[0].gain if found.tried else 0.0
-    enough = [_NEARLY * most if most > _OF_EXCESS * state.excess else math.inf] * _FITTED
+    enough = [_NEARLY * most if most > OF_EXCESS * state.excess else math.inf] * _FITTED
     enough[:_FIRST_ORDER] = [0.0] * _FIRST_ORDER
     offers: list[tuple[Tried, ...]] = [(each,) for each, least in zip(found.tried, enough, strict=False) if each.gain > least]
     laws: dict[str, int] = {}
@@ -258,13 +259,13 @@ def name_of(model: Model, effect: Effect) -> str:
     return [prefix for prefix, held in zip(model.prefixes, model.terms, strict=True) if held.effect is effect][-1]
 
 
-def worth(state: State, tried: Sequence[Tried]) -> bool:
+def worth(state: State, tried: Sequence[Tried], of_excess: float = OF_EXCESS) -> bool:
     """True when a screened candidate promises a real gain although nothing much is left."""
-    return bool(tried) and earns(state, tried[0].left, tried[:1])
+    return bool(tried) and earns(state, tried[0].left, tried[:1], of_excess)
 
 
-def earns(state: State, left: float, tried: Sequence[Tried]) -> bool:
-    """True when leaving ``left`` is more than what ``tried`` takes off by chance, and a real part of what is missing."""
+def earns(state: State, left: float, tried: Sequence[Tried], of_excess: float = OF_EXCESS) -> bool:
+    """True when leaving ``left`` is more than what ``tried`` takes off by chance, and the part ``of_excess`` of it all."""
     gain = state.left - left
     chance = max((each.by_chance for each in tried), default=0.0)
-    return gain > max(OF_FLOOR * state.floor, _OF_EXCESS * state.excess, BY_CHANCE * chance)
+    return gain > max(OF_FLOOR * state.floor, of_excess * state.excess, BY_CHANCE * chance)

@@ -97,7 +97,7 @@ def suspects(model: Model, record: Record, bandwidth: float, floor: float) -> Su
     track = Track.of([record], bandwidth, model)
     missing = track.residual(model)
     n = missing.shape[0]
-    fit = Fit(model, (), Solution(np.zeros(0), missing, np.zeros((n, 0)), True, 0), np.zeros(0))
+    fit = Fit(model, (), Solution(np.zeros(0), missing, np.zeros((n, 0)), True, 0, np.zeros(0, dtype=np.bool_)), np.zeros(0))
     scales = scales_of(track)
     found = _present(track, model, missing)
     offered = [candidate for candidate in candidates(model, scales) if candidate.effect.id not in _SLOW_EFFECTS]

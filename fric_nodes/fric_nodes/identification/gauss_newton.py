@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..record import Array
+from ..record import Array, Mask
 from ..threads import mapped
 
 __all__ = ["Solution", "minimise"]
@@ -40,6 +40,7 @@ class Solution:
         jacobian: there, shape ``(n, n_parameters)``; with ``secant`` it may be the update of one a step or two before.
         converged: False when the limit of iterations was reached before.
         iterations: number of Jacobians.
+        free: True for parameters that no bound holds from going where less would be left, shape ``(n_parameters,)``.
     """
 
     point: Array
@@ -47,6 +48,7 @@ class Solution:
     jacobian: Array
     converged: bool
     iterations: int
+    free: Mask
 
 
 def minimise(
@@ -85,6 +87,11 @@ def minimise(
     slow = 0  # steps in a row that gained nearly nothing, as where differences can't see the minimum any better
     jacobian = np.empty((residual.shape[0], point.shape[0]))
     exact, foreseen = False, False  # the Jacobian at this point, and the step that led to it
+
+    def solution(converged: bool, iterations: int) -> Solution:
+        free = _inwards(jacobian.T @ residual, lower - point, upper - point)
+        return Solution(point, residual, jacobian, converged, iterations, free)
+
     for iteration in range(1, max_iterations + 1):
         exact = not (secant and exact and foreseen)
         if exact:
@@ -96,7 +103,7 @@ def minimise(
             promised = -float(step @ (2.0 * gradient + normal @ step))
             small = np.all(np.abs(step) <= point_tolerance * (np.abs(point) + point_tolerance))
             if small or 0 < most_slow <= slow or 0.0 <= promised <= cost_tolerance * cost:
-                return Solution(point, residual, jacobian, True, iteration)
+                return solution(True, iteration)
             if promised < 0.0:
                 # A bound has bent the step uphill; a shorter one goes along the gradient.
                 damping, growth = max(damping, 1e-6) * growth, 2.0 * growth
@@ -122,10 +129,10 @@ def minimise(
                 normal, gradient, exact = jacobian.T @ jacobian, jacobian.T @ residual, True
         else:
             # No direction goes down: the differences have said all they can.
-            return Solution(point, residual, jacobian, True, iteration)
+            return solution(True, iteration)
     if not (secant and foreseen):
         _differences(function, point, residual, upper, difference, jacobian, threads)
-    return Solution(point, residual, jacobian, False, max_iterations)
+    return solution(False, max_iterations)
 
 
 def _differences(
@@ -160,13 +167,16 @@ def _proposal(normal: Array, gradient: Array, damping: float, point: Array, lowe
     return np.asarray(step / max(1.0, float(np.max(np.abs(step) / reach))), dtype=np.float64)
 
 
+def _inwards(gradient: Array, lowest: Array, highest: Array) -> Mask:
+    """True for parameters that don't stay: at a bound with the gradient pointing out, one does."""
+    return ~((lowest >= 0.0) & (gradient > 0.0)) & ~((highest <= 0.0) & (gradient < 0.0))
+
+
 def _bounded_step(normal: Array, gradient: Array, damping: float, lowest: Array, highest: Array) -> Array:
     """Step that minimises the damped quadratic model within ``lowest`` to ``highest``, approximately where bounds bind."""
     size = np.sqrt(np.diag(normal))
-    free = size > 0.0
+    free = (size > 0.0) & _inwards(gradient, lowest, highest)
     step = np.zeros(gradient.shape[0])
-    # At a bound with the gradient pointing out, a parameter stays.
-    free &= ~((lowest >= 0.0) & (gradient > 0.0)) & ~((highest <= 0.0) & (gradient < 0.0))
     while np.any(free):
         scale = size[free]
         scaled = normal[np.ix_(free, free)] / np.outer(scale, scale)
