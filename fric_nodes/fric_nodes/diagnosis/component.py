@@ -30,7 +30,9 @@ __all__ = ["Signature", "agreed", "signatures"]
 _SPAN = 0.25  # [s], of the steps in which something changes with time
 _REST = 0.01  # of the speed, below which a body rests
 _ROWS = 6000  # that a fit uses at most
-_WAVES = 40  # periods along the travel that are tried
+_MOST_WAVES = 25.0  # cycles over the travel, from _FEWEST_WAVES on,
+_FEWEST_WAVES = 0.7
+_DETUNED = 0.2  # of a cycle, by which neighbouring ones differ over the travel
 _LAGS = 12  # widths of a force that lags behind the position
 _KNOTS = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # of the travel, from where on such a force may pull
 
@@ -244,12 +246,22 @@ def _follower(position: Array, play: float) -> Array:
 
 
 def _waves(motion: Sequence[Motion]) -> Iterator[list[list[Array]]]:
-    """The acceleration of an error of the reading, phase by phase of a wave, for periods over the travel."""
+    """The acceleration of an error of the reading, phase by phase of a wave, for periods over the travel; also with an overtone.
+
+    A large error bends the wave, which is one of the true position, as the reading shows it.
+    """
     travel = max(float(np.ptp(np.concatenate([each.position for each in motion]))), 1e-12)
-    for number in np.geomspace(0.7, 25.0, _WAVES):
+    for number in np.arange(_FEWEST_WAVES, _MOST_WAVES, _DETUNED):
         wave = 2.0 * math.pi * float(number) / travel
-        yield [
-            [change * function(wave * each.position) for each, change in zip(motion, changes, strict=True)]
-            for function in (np.sin, np.cos)
-            for changes in ([each.acceleration for each in motion], [each.velocity**2 for each in motion])
-        ]
+        alone = _accelerations(motion, wave)
+        yield alone
+        yield alone + _accelerations(motion, 2.0 * wave)
+
+
+def _accelerations(motion: Sequence[Motion], wave: float) -> list[list[Array]]:
+    """Those of an error of the reading that goes as a ``wave`` [1/x] of the position, but for their sizes."""
+    return [
+        [change * function(wave * each.position) for each, change in zip(motion, changes, strict=True)]
+        for function in (np.sin, np.cos)
+        for changes in ([each.acceleration for each in motion], [each.velocity**2 for each in motion])
+    ]
