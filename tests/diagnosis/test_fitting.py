@@ -32,7 +32,7 @@ def recording(truth: Model, seed: int, unseen_force: float = 0.0, duration: floa
 
 
 def test_a_term_that_comes_out_at_nothing_is_credited_with_nothing() -> None:
-    """Friction that falls short where a drag would add to it: a drag of less than nothing would explain it, and there is none."""
+    """Friction falls short where a drag would add to it: a drag of less than nothing would explain it, and there is none."""
     held = recording(TRUTH, 1)
     speed = np.gradient(held.position, H)
     less = Record(held.time, held.position, held.effort - 150.0 * speed * np.abs(speed), source="bag")
@@ -49,7 +49,7 @@ def test_a_term_that_comes_out_at_nothing_is_credited_with_nothing() -> None:
 
 
 def test_what_helps_is_told_beside_something_unknown() -> None:
-    """A restless force of 3 N holds many times a ripple's energy: the ripple takes too little to be an explanation, and helps."""
+    """A restless force of 3 N holds many times a ripple's energy: the ripple takes too little to explain it, and helps."""
     truth = TRUTH.with_terms([*TRUTH.terms, term("ripple", cosine=0.7, sine=-0.55, period=0.031)])
     track = Track.of([recording(truth, 1, 3.0), recording(truth, 2, 3.0)], 140.0, NOMINAL)
     state = refit(track, NOMINAL)

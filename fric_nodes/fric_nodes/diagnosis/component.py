@@ -246,7 +246,7 @@ def _follower(position: Array, play: float) -> Array:
 
 
 def _waves(motion: Sequence[Motion]) -> Iterator[list[list[Array]]]:
-    """The acceleration of an error of the reading, phase by phase of a wave, for periods over the travel; also with an overtone.
+    """Acceleration of an error of the reading, phase by phase of a wave, for periods over the travel; and with an overtone.
 
     A large error bends the wave, which is one of the true position, as the reading shows it.
     """

@@ -40,7 +40,8 @@ _FIRST_ORDER = 2  # candidates that are fitted in full because they are the best
 _NEARLY = 0.5  # of what the best takes off: another that does is fitted, too,
 _FITTED = 4  # and at most because they lack least where their fit begins,
 _LAWS = 3  # of them laws of one effect
-_REFINED = 2  # the best, with more iterations
+_REFINED = 2  # the best, with more iterations,
+_ALSO_REFINED = 0.9  # of what the best takes off: the first of another effect that does is refined, too
 _SHARES = (0.5, 0.3, 0.7)  # of the mass behind a transmission, from which fits begin
 _IN_REACH = 0.6  # of what is to be beaten, a rough fit takes off before it is worth more iterations
 _ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
@@ -104,7 +105,8 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         fit = _first_fit(track, state, beginning.model, scales)
         fitted.append(_rival(track, state, offer, fit, found))
     fitted = _side_by_side(track, fitted, found.unpaid)
-    for k, rival in enumerate(fitted[:_REFINED]):
+    for k in _worth_refining(state, fitted):
+        rival = fitted[k]
         if state.left - rival.left < _IN_REACH * (state.left - to_beat):
             continue
         bounds = bounds_of(rival.fit.model, scales)
@@ -114,6 +116,16 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         fitted[k] = _rival(track, state, rival.offer, fit, found)
     fitted = _side_by_side(track, fitted, found.unpaid)
     return [*(_shaped(track, state, rival, found, scales) for rival in fitted[:1]), *fitted[1:]]
+
+
+def _worth_refining(state: State, fitted: Sequence[Rival]) -> list[int]:
+    """Numbers of the rivals, of which the best is the first, that get more iterations."""
+    best = list(range(min(_REFINED, len(fitted))))
+    effects = {fitted[k].effect.id for k in best}
+    for k, rival in enumerate(fitted):
+        if rival.effect.id not in effects and state.left - rival.left > _ALSO_REFINED * (state.left - fitted[0].left):
+            return [*best, k]
+    return best
 
 
 def _first_fit(track: Track, state: State, model: Model, scales: Scales) -> Fit:
