@@ -53,7 +53,7 @@ def test_the_axis_has_direction_dependent_friction_that_survives_on_blocks_held_
 
 def test_what_helps_on_the_axis_survives_on_blocks_held_back(emps: Diagnosis) -> None:
     """More is missing than its friction, and no effect alone is an explanation."""
-    assert named(emps)[0] == "unknown"
+    assert emps.findings[0].effect == "unknown"
     helping = {each.effect: each for each in emps.findings[1:]}
     assert len(helping) >= 3
     assert all(each.confidence < 0.2 for each in helping.values())
