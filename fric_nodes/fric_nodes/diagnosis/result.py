@@ -199,7 +199,7 @@ class Diagnosis:
             left = f" Of its energy {100.0 * first.share:.2g} % stay beside what helps: {helpful}." if first and helpful else ""
             return f"Something is missing, and no known effect explains it; it sits here: {where}.{left}"
         names = " and ".join(
-            f"{each.title} ({100 * each.confidence:.0f} % sure)" for each in self.findings if each.effect != "unknown"
+            f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in self.findings if each.effect != "unknown"
         )
         return f"Missing: {names}; with it the NOE on unseen data falls from {v.noe_refit:.3g} % to {v.noe_augmented:.3g} %."
 
