@@ -198,9 +198,8 @@ class Diagnosis:
             helpful = " and ".join(each.title for each in self.findings[1:])
             left = f" Of its energy {100.0 * first.share:.2g} % stay beside what helps: {helpful}." if first and helpful else ""
             return f"Something is missing, and no known effect explains it; it sits here: {where}.{left}"
-        names = " and ".join(
-            f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in self.findings if each.effect != "unknown"
-        )
+        named = (each for each in self.findings if each.effect != "unknown")
+        names = " and ".join(f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in named)
         return f"Missing: {names}; with it the NOE on unseen data falls from {v.noe_refit:.3g} % to {v.noe_augmented:.3g} %."
 
     @property
