@@ -447,7 +447,7 @@ def _finding(
     excess = max(step.missing, 1e-300)
     share = min(max((step.before - step.after) / max(excess, growth.begin.excess), 0.0), 1.0)
     rival = next((each for each in step.rivals if effect.id not in {name.split("#")[0] for name in each.names}), None)
-    sure = confidence_of(rest, step)
+    sure = confidence_of(rest, step, share)
     parameters = {
         p.name: Estimate(p.value, end.standard_errors.get(p.name), p.declaration.unit(end.units))
         for p in end.parameters()

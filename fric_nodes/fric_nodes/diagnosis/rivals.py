@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..effect import Effect
-from ..model import Model, ModelError
+from ..model import Model, ModelError, Term
 from ..threads import mapped
 from .along import Along
 from .candidates import Scales
 from .fitting import Beginning, State, begun, bounds_of, free_names, is_driven, shaken, unseen
 from .screen import Screening, Tried
 from .track import Fit, Track
+from .universe import extensions
 
 __all__ = [
     "BY_CHANCE",
@@ -38,12 +39,14 @@ _PAIR_BETTER = 0.5  # of what the best single effect leaves, for a pair to be tr
 PER_PARAMETER = 0.012  # of what is missing
 _FIRST_ORDER = 2  # candidates that are fitted in full because they are the best at first order,
 _NEARLY = 0.5  # of what the best takes off: another that does is fitted, too,
+_NEARLY_DRIVEN = 0.25  # or a transmission, which lacks much where its fit begins, whatever the machine does,
 _FITTED = 4  # and at most because they lack least where their fit begins,
 _LAWS = 3  # of them laws of one effect
 _REFINED = 2  # the best, with more iterations,
 _ALSO_REFINED = 0.9  # of what the best takes off: the first of another effect that does is refined, too
 _SHARES = (0.5, 0.3, 0.7)  # of the mass behind a transmission, from which fits begin
 _IN_REACH = 0.6  # of what is to be beaten, a rough fit takes off before it is worth more iterations
+_FURTHER = 12  # iterations of a fit by a law that goes further
 _ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
 OF_EXCESS = 0.12  # and of what is missing: less is no explanation
@@ -114,7 +117,9 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         if to_beat > much and _steps(rival) and unseen(track, fit, fit.residual) > much:
             fit = shaken(track, fit, bounds, (1.0 + OF_FLOOR) * state.floor)
         fitted[k] = _rival(track, state, rival.offer, fit, found)
-    fitted = _side_by_side(track, fitted, found.unpaid)
+        if fitted[k].left > much:
+            fitted[k] = _extended(track, state, fitted[k], found, scales)
+    fitted = _with_play(_side_by_side(track, fitted, found.unpaid), state, scales)
     return [*(_shaped(track, state, rival, found, scales) for rival in fitted[:1]), *fitted[1:]]
 
 
@@ -161,6 +166,69 @@ def _shaped(track: Track, state: State, rival: Rival, found: Screening, scales: 
     return best
 
 
+def _extended(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> Rival:
+    """``rival``, or the same by a law that goes further than its own, where that leaves much less.
+
+    A spring that hardens lies nearer to a gap with soft stops than to a linear spring: held against other effects by its usual
+    law alone it would lose what is its own.
+    """
+    best = rival
+    for place, held in enumerate(rival.fit.model.terms):
+        if held.effect not in [each.column.term.effect for each in rival.offer]:
+            continue
+        for law in extensions(held.effect):
+            term = _taken_further(held, law, scales)
+            model = rival.fit.model.with_terms(term if k == place else each for k, each in enumerate(rival.fit.model.terms))
+            fit = track.fit(model, free_names(model), _FURTHER, bounds_of(model, scales))
+            other = _rival(track, state, rival.offer, fit, found)
+            dearer = price_of(law, state.excess) - price_of(held.effect, state.excess)
+            if best.left - other.left > max(OF_FLOOR * state.floor, dearer):
+                best = replace(other, dear=other.dear + dearer)
+    return best
+
+
+def _taken_further(held: Term, law: Effect, scales: Scales) -> Term:
+    """``held`` by a ``law`` that goes further: a little, under the typical force."""
+    given = dict(zip((p.name for p in held.effect.parameters), held.values, strict=True))
+    values = []
+    for p in law.parameters:
+        if p.name in given:
+            values.append(given[p.name])
+        elif p.dimension == "F/x^3":
+            stiffness = next(given[other.name] for other in held.effect.parameters if other.dimension == "F/x")
+            values.append(stiffness**3 / scales.level**2)
+        else:
+            values.append(p.lower if p.default is None else p.default)
+    return Term(law, tuple(values))
+
+
+def _with_play(rivals: list[Rival], state: State, scales: Scales) -> list[Rival]:
+    """``rivals`` without the stops at whose ends no play comes out, where a spring explains as much: that is what they are."""
+    springs = [rival.left for rival in rivals if all(_is_spring(each.column.term.effect) for each in rival.offer)]
+    least = min(springs, default=math.inf)
+    return [rival for rival in rivals if not _closed(rival, scales) or least - rival.left > OF_FLOOR * state.floor]
+
+
+def _parts_bodies(effect: Effect) -> bool:
+    return effect.link is not None or effect.play is not None
+
+
+def _is_spring(effect: Effect) -> bool:
+    return effect.link is not None and effect.play is None
+
+
+def _closed(rival: Rival, scales: Scales) -> bool:
+    """True where a play of ``rival`` comes out at less than the sensor tells."""
+    gaps = [
+        value
+        for held in rival.fit.model.terms
+        if held.effect in [each.column.term.effect for each in rival.offer] and held.effect.play is not None
+        for p, value in zip(held.effect.parameters, held.values, strict=True)
+        if p.dimension == "x"
+    ]
+    return bool(gaps) and max(gaps) < scales.grain
+
+
 def _offered(track: Track, state: State, found: Screening, scales: Scales, far: bool) -> dict[tuple[Tried, ...], Beginning]:
     """What is fitted in full, and from where: the best at first order, and what lacks least where its fit begins.
 
@@ -175,7 +243,11 @@ def _offered(track: Track, state: State, found: Screening, scales: Scales, far: 
     most = found.tried[0].gain if found.tried else 0.0
     enough = [_NEARLY * most if most > OF_EXCESS * state.excess else math.inf] * _FITTED
     enough[:_FIRST_ORDER] = [0.0] * _FIRST_ORDER
-    offers: list[tuple[Tried, ...]] = [(each,) for each, least in zip(found.tried, enough, strict=False) if each.gain > least]
+    offers: list[tuple[Tried, ...]] = [
+        (each,)
+        for each, least in zip(found.tried, enough, strict=False)
+        if each.gain > least * (_NEARLY_DRIVEN / _NEARLY if _parts_bodies(each.column.term.effect) else 1.0)
+    ]
     laws: dict[str, int] = {}
     for offer in sorted(begins, key=lambda one: begins[one].lacks * (found.unpaid if _slips(one) else 1.0)):
         if offer in offers or begins[offer].lacks > lacks:
@@ -267,8 +339,10 @@ def mass_off(mass: float, model: Model) -> float:
 
 
 def name_of(model: Model, effect: Effect) -> str:
-    """The prefix of the newest term of ``effect``."""
-    return [prefix for prefix, held in zip(model.prefixes, model.terms, strict=True) if held.effect is effect][-1]
+    """The prefix of the newest term of ``effect``, by whatever law."""
+    of_it = [prefix for prefix, held in zip(model.prefixes, model.terms, strict=True) if held.effect.id == effect.id]
+    own = [prefix for prefix, held in zip(model.prefixes, model.terms, strict=True) if held.effect is effect]
+    return (own or of_it)[-1]
 
 
 def worth(state: State, tried: Sequence[Tried], of_excess: float = OF_EXCESS) -> bool:
