@@ -263,9 +263,10 @@ def _concluded(
     doubtful = all(each.confidence < AS_LIKELY for each in findings)
     plain = growth.unhelped or growth
     beside = growth.beyond > 0.0 or plain is not growth
-    if missing and (rest > _SIGNED or doubtful or far_off or beside):
+    if missing and (rest > _SIGNED or doubtful or far_off or beside or len(growth.steps) >= _MANY):
         likely, of_all = _signature_of(searched, plain, max(rest, plain.rest))
-        # Where one signature explains more than several effects do together, these have only stood in for it.
+        # Where one signature explains more than several effects do together, these have only stood in for it: a force that
+        # swings at one frequency goes with the motion it makes there as a delay, a mode and bristles might.
         stand_in = of_all and len(findings) > 1
     # How well both shares are known depends on how far what is missing stands out, there and here.
     there = min(_LEFT_UNSEEN + _FLOOR_UNSURE * noise_floor / max(scored.noe_refit - noise_floor, 1e-300), _HARDLY)

@@ -47,7 +47,7 @@ _HELPED = 0.98  # of what is left: with more left after a round, there is no fur
 _DRAWN = 8  # places each time
 _AFTER_A_SHAKE = 3  # iterations
 _WELL_KNOWN = 0.3
-_LOWEST_LIMIT = 0.3  # of the largest recorded force
+_LOWEST_LIMIT = 0.01  # of the largest recorded force: a command may lie far beyond it
 _MOST_FORCE = 2.0  # of the largest recorded force, a term's
 
 
