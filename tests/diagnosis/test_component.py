@@ -82,8 +82,8 @@ def test_what_a_contact_takes_up_at_rest_is_not_missing_there(bandwidth: float) 
 
 
 def test_observers_are_heard_alike() -> None:
-    slow = [Signature("command path", "gain", 0.90, -2.20), Signature("guideway friction", "level", 0.89, -2.15)]
-    fast = [Signature("guideway friction", "level", 0.95, -2.90), Signature("command path", "gain", 0.85, -1.80)]
+    slow = [Signature("command path", "gain", 0.90, -2.20, 40), Signature("guideway friction", "level", 0.89, -2.15, 40)]
+    fast = [Signature("guideway friction", "level", 0.95, -2.90, 40), Signature("command path", "gain", 0.85, -1.80, 40)]
     assert agreed([slow]).component == "command path"
     both = agreed([slow, fast])
     assert both.component == "guideway friction"

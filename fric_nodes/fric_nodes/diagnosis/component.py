@@ -46,12 +46,14 @@ class Signature:
         title: the way, in words.
         share: of the missing force's energy that it explains.
         evidence: how far it is to be believed: the information criterion of Bayes per independent number, the less the better.
+        n_coefficients: that it has to choose.
     """
 
     component: str
     title: str
     share: float
     evidence: float
+    n_coefficients: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,7 @@ def agreed(of_observers: Sequence[Sequence[Signature]]) -> Signature:
 def _marked(component: str, title: str, left: float, n: int, independent: float) -> Signature:
     """The signature of ``n`` coefficients that leave the share ``left`` of ``independent`` numbers."""
     left = max(left, 1e-6)
-    return Signature(component, title, 1.0 - left, math.log(left) + n * math.log(independent) / independent)
+    return Signature(component, title, 1.0 - left, math.log(left) + n * math.log(independent) / independent, n)
 
 
 def _left(columns: Array, target: Array) -> float:

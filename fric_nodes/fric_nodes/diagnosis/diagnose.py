@@ -51,6 +51,8 @@ _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held ba
 _KEPT = 0.4  # of what a grown model took off where it was fitted, to be found on the recordings held back
 _FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is missing is known the worse
 _MANY = 3  # effects at once that still leave something are more likely to have stood in for one
+_SHARED = 1.0 / 3.0  # of what is missing: where so many are missed by less altogether, each does the work of the others
+_FEW = 16  # coefficients, by which a signature is simpler than so many effects
 _SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, something unknown remains however little is known of the floor
 _TWINS = 5
@@ -264,7 +266,8 @@ def _concluded(
     plain = growth.unhelped or growth
     beside = growth.beyond > 0.0 or plain is not growth
     if missing and (rest > _SIGNED or doubtful or far_off or beside or len(growth.steps) >= _MANY):
-        likely, of_all = _signature_of(searched, plain, max(rest, plain.rest))
+        shared = len(findings) >= _MANY and sum(each.share for each in findings) < _SHARED
+        likely, of_all = _signature_of(searched, plain, max(rest, plain.rest), shared)
         # Where one signature explains more than several effects do together, these have only stood in for it: a force that
         # swings at one frequency goes with the motion it makes there as a delay, a mode and bristles might.
         stand_in = of_all and len(findings) > 1
@@ -279,7 +282,7 @@ def _concluded(
         where = locate(held, remains, scales, end)
         unexplained = replace(unexplained, where=where)
         if likely is not None and unknown:
-            nobody = _unknown(where, likely, growth, scored, unexplained.share)
+            nobody = _unknown(where, likely, growth, scored, unexplained.share, stand_in)
             # What helps is told all the same; beside something unknown one in ten of such findings was right.
             found = [replace(each, confidence=min(each.confidence, round(1.0 - nobody.confidence, 4))) for each in findings]
             findings = [nobody, *sorted(found, key=lambda each: -each.share)]
@@ -501,10 +504,19 @@ def _left(held: Track, residual: Array, floor: Sequence[Array]) -> list[Array]:
     return energy
 
 
-def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation, rest: float) -> Finding:
+def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation, rest: float, stand_in: bool) -> Finding:
     tried = sorted((s for s in growth.last), key=lambda each: each.left)
     best = tried[0].column.term.effect if tried else None
     beside = f"; the best of them, {best.title}, doesn't explain it" if best is not None else ""
+    evidence = (
+        f"{100 * rest:.3g} % of the missing force's energy is left by every combination of known effects{beside}; "
+        f"it looks most like {likely.title}, which would take {100 * likely.share:.3g} % of it"
+    )
+    if stand_in:
+        evidence = (
+            f"it looks most like {likely.title}, which takes {100 * likely.share:.3g} % of the missing force's energy by itself; "
+            f"known effects leave {100 * rest:.3g} % of it, but only several that do each other's work"
+        )
     return Finding(
         effect="unknown",
         law="",
@@ -514,16 +526,18 @@ def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation
         where=where,
         component=likely.component,
         share=rest,
-        evidence=f"{100 * rest:.3g} % of the missing force's energy is left by every combination of known effects{beside}; "
-        f"it looks most like {likely.title}, which would take {100 * likely.share:.3g} % of it",
+        evidence=evidence,
         parameters={},
         noe_before=scored.noe_refit,
         noe_after=scored.noe_augmented,
     )
 
 
-def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float) -> tuple[Signature, bool]:
-    """The signature of what is missing, and True where it explains more than what was grown.
+def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shared: bool) -> tuple[Signature, bool]:
+    """The signature of what is missing, and True where it is to be believed rather than what was grown.
+
+    That is where it explains more, and where several effects do each other's work (``shared``), of which none would be missed
+    much, and the signature explains most of it by itself in one simple way.
 
     That is of all that is missing, by the observers to which it stands out; of what is left, where the grown model explains
     more and the signature most of what that leaves.
@@ -536,7 +550,8 @@ def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float) -> tuple
     clear = clear or [look for look in looks if look[0].bandwidth == growth.track.bandwidth]
     whole = agreed([signatures(track, state.fit, () if growth.steps else growth.last) for track, state in clear])
     # What hardly explains anything has no say in what is left either.
-    if not growth.steps or whole.share > 1.0 - rest or rest > _HARDLY:
+    simple = shared and whole.share > _MOSTLY and whole.n_coefficients <= _FEW
+    if not growth.steps or whole.share > 1.0 - rest or rest > _HARDLY or simple:
         return whole, True
     track = clear[0][0]
     left = signatures(track, refit(track, growth.end.fit.model, max_iterations=_FIRST_FIT).fit, growth.last)[0]

@@ -29,6 +29,8 @@ __all__ = [
 
 FORMAT = "fric-report/1"
 
+_HARDLY_ANY = 0.05  # of what is missing
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -196,7 +198,11 @@ class Diagnosis:
         if first is None or first.effect == "unknown":
             where = first.where.regime if first is not None else "not located"
             helpful = " and ".join(each.title for each in self.findings[1:])
-            left = f" Of its energy {100.0 * first.share:.2g} % stay beside what helps: {helpful}." if first and helpful else ""
+            left = ""
+            if first and helpful and first.share < _HARDLY_ANY:
+                left = f" Several effects explain it only together, each doing part of the others' work: {helpful}."
+            elif first and helpful:
+                left = f" Of its energy {100.0 * first.share:.2g} % stay beside what helps: {helpful}."
             return f"Something is missing, and no known effect explains it; it sits here: {where}.{left}"
         named = (each for each in self.findings if each.effect != "unknown")
         names = " and ".join(f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in named)
