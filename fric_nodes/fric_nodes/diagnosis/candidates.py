@@ -204,7 +204,7 @@ def _amplitudes(parameter: Parameter, scales: Scales) -> Sequence[float]:
     if parameter.dimension == "s":
         return [float(value) for value in np.geomspace(0.5 * scales.step, 40.0 * scales.step, 6)]
     if parameter.positive:
-        return [share * scales.most for share in (0.04, 0.08, 0.16, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.95)]  # a limit
+        return [share * scales.most for share in (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.95)]  # a limit
     return [share * scales.level for share in (0.05, 0.15, 0.4)]
 
 

@@ -514,8 +514,8 @@ def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation
     )
     if stand_in:
         evidence = (
-            f"it looks most like {likely.title}, which takes {100 * likely.share:.3g} % of the missing force's energy by itself; "
-            f"known effects leave {100 * rest:.3g} % of it, but only several that do each other's work"
+            f"it looks most like {likely.title}, which by itself takes {100 * likely.share:.3g} % of the energy away that "
+            f"is missing; known effects leave {100 * rest:.3g} % of it, but only several that do each other's work"
         )
     return Finding(
         effect="unknown",
