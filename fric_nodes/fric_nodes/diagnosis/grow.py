@@ -164,8 +164,8 @@ def _compared(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None
         lacks = _lacks(best) + implausible(best.track.mass, best.end.fit.model)
         if len(tried) > _OTHER_BEGINNINGS or lacks < (_AGAIN if best.ended else _AGAIN_FOR_MORE):
             break
-        if other.effect.id in begun:
-            continue
+        if begun & {name.split("#")[0] for name in other.names}:
+            continue  # with what it has besides it would come no further than that alone
         begun.add(other.effect.id)
         tell(f"once more, from {' and '.join(other.names)}")
         tried.append(_added(tracks, start, other, tell, most=_TO_COMPARE))
