@@ -18,7 +18,7 @@ from .fitting import NOTHING, State, best_track, refit
 from .laws import with_best_laws
 from .rivals import BY_CHANCE, OF_EXCESS, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
 from .screen import Screening, Tried, screen
-from .settle import FLOOR_KNOWN, Settled, Step, audit, exchanged, merged, settled
+from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, audit, exchanged, merged, settled
 from .track import Track
 
 __all__ = ["Growth", "grow", "helped"]
@@ -29,8 +29,6 @@ _AGAIN = 0.05  # where nothing more helps and more is left of what is missing,
 _AGAIN_FOR_MORE = 0.01  # or more than that, and more terms would come
 _MOST_TERMS = 4
 _LITTLE = 0.004  # of what is missing at the start: laws that differ in form only leave as much
-_NEARLY_ALL = 0.8  # of what little is left: what takes that is an effect, not what laws that differ in form leave
-_CLEARLY = 3.0  # floors: more is missing where such an effect is looked for
 _FAINTLY = 3.0  # floors: no more is missing where a faint term is looked for
 _FAINT = 0.04  # of the floor, and
 _DRAWS = 40.0  # times what one parameter takes off noise: so little may still be seen clearly
@@ -294,8 +292,8 @@ def _added(
             state, steps = with_best_laws(track, state, steps, tell)
         scales = scales_of(track)
         little = max(_LITTLE * refit(track, begin.fit.model, max_iterations=4).excess, FLOOR_KNOWN * state.floor)
-        if state.excess < little and state.excess > _CLEARLY * state.floor:
-            least = max(least, _NEARLY_ALL)  # beside an actuator at its limit all else is little
+        if state.excess < little and state.excess > CLEARLY * state.floor:
+            least = max(least, NEARLY_ALL)  # beside an actuator at its limit all else is little
         elif state.excess < little:
             last = _screened(track, state)
             break

@@ -16,11 +16,11 @@ from .track import Track, Twin
 from .twin import twins
 from .universe import worth_trying
 
-__all__ = ["FLOOR_KNOWN", "Settled", "Step", "audit", "exchanged", "merged", "settled"]
+__all__ = ["CLEARLY", "FLOOR_KNOWN", "NEARLY_ALL", "Settled", "Step", "audit", "exchanged", "merged", "settled"]
 
 _TO_STAY = 0.004  # of what is missing at the start, beside all other terms
-_NEARLY_ALL = 0.8  # of what is missing without it: what takes that stays, however little that is beside the rest,
-_CLEARLY = 3.0  # if it is more than so many floors
+NEARLY_ALL = 0.9  # of what little is left: what takes that is an effect, and not what laws that differ in form leave,
+CLEARLY = 3.0  # if it is more than so many floors
 _AUDITED = 0.04  # of what is missing: with more left, it is looked at whether halves of the recordings tell the parameters
 FLOOR_KNOWN = 0.1  # of itself, how well a floor is known
 _TWINS = 2
@@ -235,7 +235,7 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
             # What leaves an axis of another mass behind has only changed what stands in for what.
             dearer = implausible(track.mass, without.fit.model) - implausible(track.mass, state.fit.model)
             lost = without.left - state.left + begin.excess * max(dearer, 0.0)
-            alone = lost > _NEARLY_ALL * without.excess and without.excess > _CLEARLY * without.floor
+            alone = lost > NEARLY_ALL * without.excess and without.excess > CLEARLY * without.floor
             little = OF_FLOOR * state.floor if alone else max(OF_FLOOR * state.floor, _TO_STAY * begin.excess)
             if nothing or lost < little:
                 why = "comes out at nothing" if nothing else "not needed any more"
