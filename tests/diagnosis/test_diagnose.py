@@ -69,6 +69,34 @@ def test_where_the_first_effects_leave_something_others_are_begun_with() -> None
     assert found.validation.noe_augmented < 0.1 * found.validation.noe_refit
 
 
+def test_beside_an_actuator_far_beyond_its_limit_the_other_effect_is_found() -> None:
+    # The command goes to five times the limit: what the drag takes is a thousandth of what the limit does.
+    case = draw(521420051, "pair", ("quadratic_drag", "saturation"))
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert [each.effect for each in found.findings] == ["saturation", "quadratic_drag"]
+    limit = found.findings[0].parameters["saturation.limit"]
+    assert limit.value == pytest.approx(5.94243, rel=0.02)
+    assert max(float(np.max(np.abs(record.effort))) for record in case.train) > 4.0 * limit.value
+
+
+def test_a_shaft_that_hardens_is_no_gap_with_soft_stops() -> None:
+    case = draw(668952436, "moderate", "compliance", "form")
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert [each.effect for each in found.findings] == ["compliance"]
+    assert found.findings[0].law == "hardening"
+    assert found.findings[0].parameters["compliance.stiffness"].value == pytest.approx(18540.8, rel=0.1)
+    assert found.findings[0].parameters["compliance.hardening"].value == pytest.approx(1.0359e10, rel=0.1)
+
+
+@pytest.mark.long
+def test_one_simple_cause_is_believed_rather_than_three_effects_that_share_its_work() -> None:
+    # The floor shakes at one frequency: a delay, an appendage and bristles together do as the motion does there.
+    case = draw(1919695273, "unknown", "floor_vibration")
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert found.findings[0].effect == "unknown"
+    assert found.findings[0].component == "load"
+
+
 @pytest.mark.parametrize(
     ("effects", "seed"),
     [

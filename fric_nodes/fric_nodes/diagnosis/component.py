@@ -25,7 +25,10 @@ from .candidates import place_of
 from .screen import Tried
 from .track import Fit, Motion, Track
 
-__all__ = ["Signature", "agreed", "signatures"]
+__all__ = ["FRICTION", "Signature", "agreed", "signatures"]
+
+FRICTION = "guideway friction"
+"""The component that rubs."""
 
 _SPAN = 0.25  # [s], of the steps in which something changes with time
 _REST = 0.01  # of the speed, below which a body rests
@@ -143,7 +146,7 @@ def _ways(track: Track, held: _Motions, missing: Array, model: Model) -> Iterato
     way = [np.tanh(v / (_REST * fast)) for v in rate]
     sticks = any(each.effect.level is not None for each in model.terms)
     free = [np.abs(each) if sticks else np.ones_like(each) for each in way]
-    guideway, load = "guideway friction", "load"
+    guideway, load = FRICTION, "load"
     steps, steadily = _spans(track, held.time), _slopes(track, held.time)
     yield guideway, "friction whose level changes with time", _changing(track, way, steps)
     yield guideway, "friction whose level changes with time", _changing(track, _rubbing(model, held), steps)

@@ -28,7 +28,7 @@ from ..record import Array, Record
 from ..threads import linear_algebra_in_one
 from .blocks import one_sided
 from .candidates import Scales, candidates, place_of, scales_of
-from .component import Signature, agreed, signatures
+from .component import FRICTION, Signature, agreed, signatures
 from .confidence import AS_LIKELY, UNEXPLAINED, confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, free_names, refit
@@ -550,7 +550,8 @@ def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shared: 
     clear = clear or [look for look in looks if look[0].bandwidth == growth.track.bandwidth]
     whole = agreed([signatures(track, state.fit, () if growth.steps else growth.last) for track, state in clear])
     # What hardly explains anything has no say in what is left either.
-    simple = shared and whole.share > _MOSTLY and whole.n_coefficients <= _FEW
+    # Whatever is missing in friction goes with the force that it balances: that says nothing.
+    simple = shared and whole.component != FRICTION and whole.share > _MOSTLY and whole.n_coefficients <= _FEW
     if not growth.steps or whole.share > 1.0 - rest or rest > _HARDLY or simple:
         return whole, True
     track = clear[0][0]
