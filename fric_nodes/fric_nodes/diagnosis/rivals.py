@@ -46,6 +46,10 @@ _REFINED = 2  # the best, with more iterations,
 _ALSO_REFINED = 0.9  # of what the best takes off: the first of another effect that does is refined, too
 _SHARES = (0.5, 0.3, 0.7)  # of the mass behind a transmission, from which fits begin
 _IN_REACH = 0.6  # of what is to be beaten, a rough fit takes off before it is worth more iterations
+_CLOSE = 0.98  # of what the best takes off: so close it may not be the best
+_FITTED_OUT = 3  # of such rivals
+_FACTORS = (0.25, 0.5, 2.0, 4.0)  # by which values are moved, from which they are fitted again
+_AGAIN = 4  # iterations
 _FURTHER = 12  # iterations of a fit by a law that goes further
 _ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
@@ -120,7 +124,53 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         if fitted[k].left > much:
             fitted[k] = _extended(track, state, fitted[k], found, scales)
     fitted = _with_play(_side_by_side(track, fitted, found.unpaid), state, scales)
+    if to_beat > much:
+        fitted = _side_by_side(track, _fitted_out(track, state, fitted, found, scales), found.unpaid)
     return [*(_shaped(track, state, rival, found, scales) for rival in fitted[:1]), *fitted[1:]]
+
+
+def _fitted_out(track: Track, state: State, fitted: list[Rival], found: Screening, scales: Scales) -> list[Rival]:
+    """``fitted``, of which the best of several effects that explain nearly as much are fitted until they leave no more.
+
+    The right one would leave the floor alone: while none does, which leaves less says how far its fit has come.
+    """
+    floor = (1.0 + OF_FLOOR) * state.floor
+    close: dict[str, int] = {}
+    for k, rival in enumerate(fitted):
+        if len(rival.offer) == 1 and state.left - rival.left > _CLOSE * (state.left - fitted[0].left):
+            close.setdefault(rival.effect.id, k)
+    if len(close) < 2 or min(rival.left for rival in fitted) < floor:
+        return fitted
+    result = list(fitted)
+    for k in list(close.values())[:_FITTED_OUT]:
+        rival = fitted[k]
+        bounds = bounds_of(rival.fit.model, scales)
+        begun_again = [rival.fit, *(track.fit(m, rival.fit.names, _AGAIN, bounds) for m in _elsewhere(rival, scales))]
+        best = min(begun_again, key=lambda each: float(each.residual @ each.residual))
+        other = _rival(track, state, rival.offer, track.fit(best.model, best.names, 8, bounds), found)
+        if other.left < rival.left:
+            result[k] = replace(other, dear=rival.dear)
+    return result
+
+
+def _elsewhere(rival: Rival, scales: Scales) -> list[Model]:
+    """The model of ``rival`` with other values of what its effect brings but for amplitudes: from these it may come further.
+
+    Beside friction that sticks, what is left has one valley per width of a Stribeck curve, say.
+    """
+    model, effect = rival.fit.model, rival.effect
+    bounds = bounds_of(model, scales)
+    found = []
+    for p in effect.parameters:
+        if p.linear or p.shape or p.name in effect.amplitudes:
+            continue
+        name = f"{name_of(model, effect)}.{p.name}"
+        low, high = bounds.get(name, (p.lower, math.inf))
+        for factor in _FACTORS:
+            value = model.value(name) * factor
+            if low < value < high:
+                found.append(model.with_value(name, value))
+    return found
 
 
 def _worth_refining(state: State, fitted: Sequence[Rival]) -> list[int]:
