@@ -47,6 +47,7 @@ _ALSO_REFINED = 0.9  # of what the best takes off: the first of another effect t
 _SHARES = (0.5, 0.3, 0.7)  # of the mass behind a transmission, from which fits begin
 _IN_REACH = 0.6  # of what is to be beaten, a rough fit takes off before it is worth more iterations
 _CLOSE = 0.98  # of what the best takes off: so close it may not be the best
+_AS_A_SPRING = 8  # iterations
 _FITTED_OUT = 3  # of such rivals
 _FACTORS = (0.25, 0.5, 2.0, 4.0)  # by which values are moved, from which they are fitted again
 _AGAIN = 4  # iterations
@@ -123,7 +124,8 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         fitted[k] = _rival(track, state, rival.offer, fit, found)
         if fitted[k].left > much:
             fitted[k] = _extended(track, state, fitted[k], found, scales)
-    fitted = _with_play(_side_by_side(track, fitted, found.unpaid), state, scales)
+    fitted = _with_play(track, state, fitted, found, scales)
+    fitted = _side_by_side(track, fitted, found.unpaid)
     if to_beat > much:
         fitted = _side_by_side(track, _fitted_out(track, state, fitted, found, scales), found.unpaid)
     return [*(_shaped(track, state, rival, found, scales) for rival in fitted[:1]), *fitted[1:]]
@@ -252,11 +254,35 @@ def _taken_further(held: Term, law: Effect, scales: Scales) -> Term:
     return Term(law, tuple(values))
 
 
-def _with_play(rivals: list[Rival], state: State, scales: Scales) -> list[Rival]:
-    """``rivals`` without the stops at whose ends no play comes out, where a spring explains as much: that is what they are."""
-    springs = [rival.left for rival in rivals if all(_is_spring(each.column.term.effect) for each in rival.offer)]
-    least = min(springs, default=math.inf)
-    return [rival for rival in rivals if not _closed(rival, scales) or least - rival.left > OF_FLOOR * state.floor]
+def _with_play(track: Track, state: State, rivals: list[Rival], found: Screening, scales: Scales) -> list[Rival]:
+    """``rivals`` without stops between which no play comes out, where the spring that they are explains as much."""
+    kept = []
+    for rival in rivals:
+        if not _closed(rival, scales):
+            kept.append(rival)
+            continue
+        springs = [each for each in rivals if all(_is_spring(one.column.term.effect) for one in each.offer)]
+        springs = springs or _as_springs(track, state, rival, found, scales)
+        kept += [each for each in springs if each not in rivals]
+        if min((each.left for each in springs), default=math.inf) - rival.left > OF_FLOOR * state.floor:
+            kept.append(rival)
+    return kept
+
+
+def _as_springs(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> list[Rival]:
+    """Stops without play as the spring that was screened; nothing where none was."""
+    offer = next(((each,) for each in (*found.tried, *found.laws) if _is_spring(each.column.term.effect)), None)
+    stops = [each for each in rival.fit.model.terms if each.effect.play is not None and each.effect.link is not None]
+    if offer is None or len(stops) != 1:
+        return []
+    effect = offer[0].column.term.effect
+    given = dict(zip((p.name for p in stops[0].effect.parameters), stops[0].values, strict=True))
+    if not {p.name for p in effect.parameters} <= set(given):
+        return []
+    spring = Term(effect, tuple(given[p.name] for p in effect.parameters))
+    model = rival.fit.model.with_terms(spring if each is stops[0] else each for each in rival.fit.model.terms)
+    fit = track.fit(model, free_names(model), _AS_A_SPRING, bounds_of(model, scales))
+    return [_rival(track, state, offer, fit, found)]
 
 
 def _parts_bodies(effect: Effect) -> bool:
