@@ -199,7 +199,9 @@ class Diagnosis:
             where = first.where.regime if first is not None else "not located"
             helpful = " and ".join(each.title for each in self.findings[1:])
             left = ""
-            if first and helpful and first.share < _HARDLY_ANY:
+            if first and len(self.findings) == 2 and first.share < _HARDLY_ANY:
+                left = f" What explains it, {helpful}, does so hardly better than something else would."
+            elif first and helpful and first.share < _HARDLY_ANY:
                 left = f" Several effects explain it only together, each doing part of the others' work: {helpful}."
             elif first and helpful:
                 left = f" Of its energy {100.0 * first.share:.2g} % stay beside what helps: {helpful}."

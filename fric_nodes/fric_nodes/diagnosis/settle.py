@@ -130,8 +130,16 @@ def merged(track: Track, begin: State, state: State, steps: list[Step]) -> tuple
     old = [step for step in steps if step.term.split("#")[0] in gone]
     if not old:
         return state, steps
-    step = replace(old[0], term=name_of(one.fit.model, effect), after=old[-1].after)
+    step = replace(old[0], term=name_of(one.fit.model, effect), after=_after_both(old[0], old[-1]))
     return one, [*(each for each in steps if each not in old), step]
+
+
+def _after_both(first: Step, last: Step) -> float:
+    """What two steps that are one leave to the observer of the first [F^2]: another one may have seen the last."""
+    if last is first:
+        return first.after
+    stays = max(last.after - last.floor, 0.0) / max(last.before - last.floor, 1e-300)
+    return first.floor + max(first.after - first.floor, 0.0) * min(stays, 1.0)
 
 
 def audit(track: Track, begin: Model, end: Model) -> float:
