@@ -32,6 +32,7 @@ __all__ = [
     "unseen",
     "with_amplitudes",
     "with_room",
+    "without_term",
 ]
 
 NOTHING = 0.35
@@ -147,6 +148,25 @@ def with_room(model: Model, terms: Sequence[Term]) -> list[Model]:
     for name, value in taken.items():
         values[whole.names.index(name)] -= value
     return [whole.with_values(values)]
+
+
+def without_term(model: Model, effect_id: str) -> Model:
+    """``model`` less its term of the effect ``effect_id``; the mass that hung on the body is part of it again.
+
+    A body without it would be too light, from where a fit to what accelerates it may not come back.
+    """
+    gone = [held for held in model.terms if held.effect.id == effect_id]
+    left = model.with_terms(held for held in model.terms if held.effect.id != effect_id)
+    appended = sum(
+        value for held in gone for p, value in zip(held.effect.parameters, held.values, strict=True) if p.dimension == "F s^2/x"
+    )
+    body = next((p for p in left.parameters() if "." not in p.name and p.declaration.dimension == "F s^2/x"), None)
+    if body is None or appended == 0.0:
+        return left
+    whole = body.value + appended
+    if is_driven(left) and is_driven(model):  # the body that it hung on is the load
+        left = left.with_value("load_share", (left.value("load_share") * body.value + appended) / whole)
+    return left.with_value(body.name, whole)
 
 
 def shaken(track: Track, fit: Fit, bounds: Bounds, floor: float) -> Fit:

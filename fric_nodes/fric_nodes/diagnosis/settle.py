@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model import Model, Term
 from .candidates import Scales, candidates, scales_of
-from .fitting import State, bounds_of, free_names, refit
+from .fitting import State, bounds_of, free_names, refit, without_term
 from .rivals import OF_FLOOR, Rival, implausible, name_of, price_of, rivals_of
 from .screen import Tried, screen
 from .track import Track, Twin
@@ -201,7 +201,7 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         terms = [held for held in state.fit.model.terms if held.effect.id != effect_id]
         if len(terms) != len(state.fit.model.terms) - 1:
             continue
-        without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
+        without = refit(track, without_term(state.fit.model, effect_id), max_iterations=8)
         found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance, in_pairs=False)
         rivals = [rival for rival in rivals_of(track, without, found, scales, state.left) if rival.effect.id != effect_id]
         own = state.left + _price(track, state.fit.model, step.term, without.excess)
@@ -238,7 +238,7 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
             terms = [held for held in state.fit.model.terms if held.effect.id != effect_id]
             if len(terms) != len(state.fit.model.terms) - 1:
                 continue
-            without = refit(track, state.fit.model.with_terms(terms), max_iterations=8)
+            without = refit(track, without_term(state.fit.model, effect_id), max_iterations=8)
             nothing = _is_nothing(next(each for each in state.fit.model.terms if each.effect.id == effect_id))
             # What leaves an axis of another mass behind has only changed what stands in for what.
             dearer = implausible(track.mass, without.fit.model) - implausible(track.mass, state.fit.model)
