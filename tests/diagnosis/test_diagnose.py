@@ -88,6 +88,22 @@ def test_a_shaft_that_hardens_is_no_gap_with_soft_stops() -> None:
     assert found.findings[0].parameters["compliance.hardening"].value == pytest.approx(1.0359e10, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("effect", "seed", "name", "true"),
+    [
+        # A hysteresis explains nearly as much; the fit of a Stribeck curve half as wide and twice as high goes no further.
+        ("stribeck", 804727988, "stribeck.velocity", 3.116e-3),
+        # Stops without play between them were fitted, and no spring beside them.
+        ("compliance", 1470810947, "compliance.stiffness", 10576.0),
+    ],
+)
+def test_what_comes_near_is_told_from_what_is_missing(effect: str, seed: int, name: str, true: float) -> None:
+    case = draw(seed, "moderate", effect)
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert [finding.effect for finding in found.findings] == [effect]
+    assert found.findings[0].parameters[name].value == pytest.approx(true, rel=0.1)
+
+
 @pytest.mark.long
 def test_one_simple_cause_is_believed_rather_than_three_effects_that_share_its_work() -> None:
     # The floor shakes at one frequency: a delay, an appendage and bristles together do as the motion does there.

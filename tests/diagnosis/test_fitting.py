@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.fitting import free_names, refit, unseen
+from fric_nodes.diagnosis.fitting import free_names, refit, unseen, without_term
 from fric_nodes.diagnosis.grow import Growth, helped
 from fric_nodes.diagnosis.track import Track
 from fric_nodes.model import Model, build_model, term
@@ -61,3 +61,16 @@ def test_what_helps_is_told_beside_something_unknown() -> None:
     cosine, sine, period = ripple.values
     assert period == pytest.approx(0.031, rel=0.01)
     assert np.hypot(cosine, sine) == pytest.approx(0.89, rel=0.15)
+
+
+def test_what_hung_on_a_body_is_part_of_it_again_without_the_spring() -> None:
+    hanging = term("compliance", "appendage", mass=1.5, frequency=300.0, damping=0.05)
+    grown = build_model("rigid", {"mass": 2.5}, [hanging, term("coulomb", force=3.0)])
+    assert without_term(grown, "compliance").values.tolist() == [4.0, 3.0]
+    assert without_term(grown, "coulomb").value("mass") == 2.5
+    # Behind a transmission it hung on the load: motor and load keep their masses.
+    between = term("impact_backlash", gap=1e-5, stiffness=2e5, damping=80.0)
+    driven = build_model("rigid", {"mass": 2.5, "load_share": 0.2}, [hanging, between])
+    left = without_term(driven, "compliance")
+    assert left.value("mass") * (1.0 - left.value("load_share")) == pytest.approx(2.5 * 0.8)
+    assert left.value("mass") * left.value("load_share") == pytest.approx(2.5 * 0.2 + 1.5)
