@@ -536,11 +536,11 @@ def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation
 def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shared: bool) -> tuple[Signature, bool]:
     """The signature of what is missing, and True where it is to be believed rather than what was grown.
 
-    That is where it explains more, and where several effects do each other's work (``shared``), of which none would be missed
-    much, and the signature explains most of it by itself in one simple way.
+    It is to be believed where it explains more, and where several effects do each other's work (``shared``), of which none
+    would be missed much, and the signature explains most of it by itself in one simple way.
 
-    That is of all that is missing, by the observers to which it stands out; of what is left, where the grown model explains
-    more and the signature most of what that leaves.
+    The signature is that of all that is missing, by the observers to which it stands out; or that of what is left, where the
+    grown model explains more and the signature most of what that leaves.
     """
     looks = [
         (track, refit(track, growth.begin.fit.model, max_iterations=_FIRST_FIT))

@@ -132,7 +132,7 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
 
 
 def _fitted_out(track: Track, state: State, fitted: list[Rival], found: Screening, scales: Scales) -> list[Rival]:
-    """``fitted``, of which the best of several effects that explain nearly as much are fitted until they leave no more.
+    """``fitted``, of which the best of several effects that explain nearly as much are fitted again from other values.
 
     The right one would leave the floor alone: while none does, which leaves less says how far its fit has come.
     """
