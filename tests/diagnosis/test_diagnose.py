@@ -9,7 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fric_nodes.diagnosis import Diagnosis, DiagnosisError, diagnose
+from fric_nodes.diagnosis.fitting import refit
+from fric_nodes.diagnosis.held_back import only_there
 from fric_nodes.diagnosis.prove import draw
+from fric_nodes.diagnosis.track import Track
 from fric_nodes.model_file import model_from_text, model_to_text
 from fric_nodes.report.diagnosis import diagnosis_report
 
@@ -150,6 +153,40 @@ def test_physics_that_no_effect_describes_is_said_to_be_unknown() -> None:
     assert found.findings[0].effect == "unknown"
     # A mass that changes with time has the signature of a load, whatever the reason.
     assert found.findings[0].component == "load"
+
+
+def test_what_only_the_recording_held_back_shows_is_unknown_and_located() -> None:
+    # A cable that pulls from a place on to which the other recordings never went.
+    case = draw(509008653, "unknown", "cable_chain")
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert found.mismatch
+    assert [each.effect for each in found.findings] == ["unknown"]
+    (missing,) = found.findings
+    assert missing.component == "load"
+    assert "only the recording held back" in found.sentence
+    assert "learn from the recording held back" in found.next_experiment
+    assert missing.where.quantity == "position"
+    physics = case.key["physics"]
+    assert missing.where.range[0] == pytest.approx(physics["cable_position"] + physics["cable_play"], rel=0.3)
+    went = max(float(np.max(record.position)) for record in case.train)
+    assert max(float(np.max(record.position)) for record in case.validation) > went + 0.01
+    assert "e+" not in " ".join(each.why for each in found.rejected)
+    # What was learnt stays what it was: nothing is fitted to what is held back.
+    assert found.model == found.refit
+    # The other way round it is learnt from.
+    other = diagnose(case.validation, case.train, case.nominal)
+    assert [(each.effect, each.component) for each in other.findings] == [("unknown", "load")]
+    assert "only the recording held back" not in other.sentence
+
+
+def test_a_value_that_the_recordings_learnt_from_hardly_told_is_no_missing_physics() -> None:
+    case = draw(3, "nothing")
+    off = case.nominal.with_value("coulomb.force", 1.5 * case.nominal.values[case.nominal.names.index("coulomb.force")])
+    held = Track.of(case.validation, 140.0, off)
+    lacks = held.residual(off)
+    told = held.residual(refit(held, off).fit.model)
+    assert float(lacks @ lacks) > 5.0 * float(told @ told)
+    assert only_there(case.train, case.validation, held, off) is None
 
 
 def test_the_report_is_plain_data_and_the_grown_model_reads_back(presliding: tuple[object, Diagnosis]) -> None:

@@ -33,6 +33,7 @@ from .confidence import AS_LIKELY, UNEXPLAINED, confidence_of, unknown_confidenc
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, free_names, refit
 from .grow import Growth, grow, helped
+from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
 from .locate import Where, locate, moved_back, steady
 from .result import Diagnosis, Estimate, Finding, Grown, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
@@ -64,6 +65,7 @@ _LEFT_UNSEEN = 0.05  # of what is missing in the recordings held back: what has 
 _STANDS_OUT = 10.0  # times the floor
 _LOCATING = 600.0  # [rad/s], for spans of time
 _LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of the physics
+_LEARN_IT = "learn from the recording held back, too, and hold another one back that goes where it went"
 _LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that moves the body
 
 
@@ -115,7 +117,7 @@ def diagnose(
         growth, note = confirmed(parts, growth)
         corrected.append(note)
     tell("judging on the validation recordings")
-    found = _concluded(validation, nominal, checks, corrected, tracks, searched, growth)
+    found = _concluded(train, validation, nominal, checks, corrected, tracks, searched, growth)
     if massless and not _holds_inertia(found, nominal):
         raise DiagnosisError(
             train[0].source,
@@ -222,6 +224,7 @@ def _tracks(train: Sequence[Record], start: Model) -> list[Track]:
 
 
 def _concluded(
+    train: Sequence[Record],
     validation: Sequence[Record],
     nominal: Model,
     checks: Sequence[Check],
@@ -240,9 +243,9 @@ def _concluded(
     noe = {name: 100.0 * float(each @ each) / spread for name, each in left.items()}
     noise_floor = 100.0 * _mean_square(floor) / spread
     scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
-    missing = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
+    learnt = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
     # What the recordings held back don't show has been chance, or has been over before they were made.
-    missing = missing and (noe["refit"] > (1.0 + _CONFIRMED) * noise_floor or _paired(growth, noe, noise_floor))
+    missing = learnt and (noe["refit"] > (1.0 + _CONFIRMED) * noise_floor or _paired(growth, noe, noise_floor))
     if not missing or noe["augmented"] > noe["refit"]:
         gone = (*growth.rejected, *_withdrawn(growth, missing))
         growth = replace(growth, end=growth.begin, steps=(), rejected=gone, beyond=0.0)
@@ -277,7 +280,12 @@ def _concluded(
     unknown = missing and (much or doubtful or stand_in or far_off or beside)
     unexplained = Unexplained(max(rest, growth.beyond), None)
     remains = None
-    if missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
+    alone = None if learnt else only_there(train, validation, held, begin)
+    if alone is not None:
+        remains = _left(held, left["refit"], floor)
+        where = locate(held, remains, scales, begin)
+        unexplained, findings = Unexplained(1.0, where), [_unlearnt(where, alone, scored)]
+    elif missing and (unknown or growth.end.excess > _MISMATCH * growth.end.floor):
         remains = _left(held, left["augmented"], floor)
         where = locate(held, remains, scales, end)
         unexplained = replace(unexplained, where=where)
@@ -286,14 +294,14 @@ def _concluded(
             # What helps is told all the same; beside something unknown one in ten of such findings was right.
             found = [replace(each, confidence=min(each.confidence, round(1.0 - nobody.confidence, 4))) for each in findings]
             findings = [nobody, *sorted(found, key=lambda each: -each.share)]
-    everything = None
+    everything = None if alone is None else unexplained.where
     if missing:
         energy = _difference(fast, begin, end)
         if remains is not None:
             energy = [explained + left_over for explained, left_over in zip(energy, remains, strict=True)]
         everything = locate(fast, energy, scales, end)
     return Diagnosis(
-        mismatch=missing,
+        mismatch=missing or alone is not None,
         where=everything,
         checks=tuple(checks),
         nominal=_nominal_part(nominal, begin_fit),
@@ -301,7 +309,7 @@ def _concluded(
         rejected=_rejected(growth, begin, scales_of(track)),
         validation=scored,
         unexplained=unexplained,
-        next_experiment=_next(findings, growth),
+        next_experiment=_next(findings, growth) if alone is None else _LEARN_IT,
         model=end,
         refit=begin,
         given=nominal,
@@ -309,6 +317,7 @@ def _concluded(
         notes=(*corrected, *_reservations(growth, nominal, far_off and bool(growth.steps))),
         bandwidth=held.bandwidth,
         grown=_grown(growth),
+        only_held_back=alone is not None,
     )
 
 
@@ -533,6 +542,31 @@ def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation
     )
 
 
+def _unlearnt(where: Where, alone: OnlyThere, scored: Validation) -> Finding:
+    """What only the recordings held back show."""
+    best = None if alone.best is None else alone.best.column.term.effect
+    evidence = (
+        f"the recordings learnt from lack nothing, and the one held back leaves an NOE of {scored.noe_refit:.3g} %, "
+        f"{alone.noe:.3g} % when the model is fitted to it, too, where the instruments leave {scored.noise_floor:.3g} %; "
+        f"it looks most like {alone.likely.title}, which would take {100 * alone.likely.share:.3g} % of it"
+    )
+    sure = unknown_confidence(1.0)
+    return Finding(
+        effect="unknown",
+        law="",
+        title="something that only the recording held back shows",
+        confidence=sure,
+        runner_up=None if best is None else RunnerUp(best.id, round(1.0 - sure, 4)),
+        where=where,
+        component=alone.likely.component,
+        share=1.0,
+        evidence=evidence,
+        parameters={},
+        noe_before=scored.noe_refit,
+        noe_after=scored.noe_refit,
+    )
+
+
 def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shared: bool) -> tuple[Signature, bool]:
     """The signature of what is missing, and True where it is to be believed rather than what was grown.
 
@@ -564,10 +598,11 @@ def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, .
     there = {held.effect.id for held in growth.end.fit.model.terms}
     found: dict[str, str] = dict(growth.rejected)
     excess = max(growth.begin.excess, 1e-300)
+    nothing = not growth.steps and growth.begin.excess <= _MISMATCH * growth.begin.floor
     first: Sequence[Tried] = growth.steps[0].screened if growth.steps else growth.last
     for each in first:
         name = each.column.term.effect.id
-        if name not in there and name not in found:
+        if name not in there and name not in found and not nothing:
             found[name] = f"takes {_percent(each.gain, excess)} away at first order where it was not fitted"
     for step in growth.steps:
         for rival in step.rivals:
@@ -576,8 +611,12 @@ def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, .
                     f"fitted in full it takes {_percent(step.before - rival.left, excess)} away, {step.term} more"
                 )
     offered = {candidate.effect.id for candidate in candidates(begin, scales)}
+    tried = {each.column.term.effect.id for each in first}
     for effect in EFFECTS.values():
         if effect.id in there or effect.id in found:
+            continue
+        if nothing and effect.id in tried:
+            found[effect.id] = "nothing is missing that it could explain"
             continue
         found[effect.id] = (
             "nothing in these recordings would show it"

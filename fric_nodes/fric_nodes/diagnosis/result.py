@@ -159,6 +159,7 @@ class Diagnosis:
         notes: what was corrected or left out before.
         bandwidth: of the observer that tells the missing force [rad/s]; 0 where means were compared.
         grown: how the model grew, for the report: the refitted nominal first, its term empty.
+        only_held_back: True where the recordings learnt from lack nothing, and those held back do.
         by_means: True where means of runs at constant speeds were compared, not samples.
     """
 
@@ -178,6 +179,7 @@ class Diagnosis:
     notes: tuple[str, ...]
     bandwidth: float
     grown: tuple[Grown, ...]
+    only_held_back: bool = False
     by_means: bool = False
 
     @property
@@ -197,6 +199,11 @@ class Diagnosis:
         first = self.findings[0] if self.findings else None
         if first is None or first.effect == "unknown":
             where = first.where.regime if first is not None else "not located"
+            if self.only_held_back:
+                return (
+                    f"Something is missing that only the recording held back shows: the refitted model leaves an NOE of "
+                    f"{v.noe_refit:.3g} % there, and the instruments alone leave {v.noise_floor:.3g} %; it sits here: {where}."
+                )
             helpful = " and ".join(each.title for each in self.findings[1:])
             left = ""
             if first and len(self.findings) == 2 and first.share < _HARDLY_ANY:
@@ -226,9 +233,9 @@ class Diagnosis:
 
     @property
     def force_errors_in_words(self) -> str:
-        """What :attr:`force_errors` says, or nothing where nothing was found or they don't exist."""
+        """What :attr:`force_errors` says, or nothing where nothing was added or they don't exist."""
         errors = self.force_errors
-        if errors is None or not self.findings:
+        if errors is None or not self.findings or len(self.model.terms) == len(self.refit.terms):
             return ""
         refit, grown = errors
         less = 100.0 * (1.0 - grown / refit) if refit > 0.0 else 0.0
