@@ -476,7 +476,7 @@ class Track:
         names: Sequence[str],
         max_iterations: int = 12,
         bounds: Bounds | None = None,
-        rows: Mask | None = None,
+        weights: Array | None = None,
         twin: Twin | None = None,
     ) -> Fit:
         """``model`` with the parameters ``names`` such that it lacks the least force, by default everywhere.
@@ -486,12 +486,12 @@ class Track:
             names: of the free parameters.
             max_iterations: of the fit.
             bounds: of some of them.
-            rows: of the residual, the only ones that count.
+            weights: of the rows of the residual, shape ``(n,)``.
             twin: of the recordings, to be fitted in their place.
         """
         scale = self.scale(model, names)
         found, answer = fitted_values(
-            lambda trial: self.residual(trial, twin) if rows is None else self.residual(trial, twin)[rows],
+            lambda trial: self.residual(trial, twin) * (1.0 if weights is None else weights),
             model,
             names,
             scale,
