@@ -22,9 +22,18 @@ def _in_window(t: float) -> bool:
     return t % 5.0 > 3.2
 
 
-def _recorded(friction: Callable[[float], float], gain: Callable[[float], float], mass: Callable[[float], float]) -> Record:
-    """An axis that a controller leads along swings; friction, gain and mass are relative to the usual, over time [s]."""
-    n, h = 10_000, _STEP / _FINER
+def _recorded(
+    friction: Callable[[float], float],
+    gain: Callable[[float], float],
+    mass: Callable[[float], float],
+    n: int = 10_000,
+    force: Callable[[float], float] = lambda t: 0.0,
+) -> Record:
+    """An axis that a controller leads along swings, in ``n`` samples.
+
+    Friction, gain and mass are relative to the usual, over time [s]; a ``force`` [N] acts beside them.
+    """
+    h = _STEP / _FINER
     position, effort = np.empty(n), np.empty(n)
     q = v = 0.0
     for k in range(n):
@@ -35,7 +44,7 @@ def _recorded(friction: Callable[[float], float], gain: Callable[[float], float]
         position[k], effort[k] = q, u
         for _ in range(_FINER):
             against = _LEVEL * friction(t) * math.tanh(v / 1e-3) + _VISCOUS * v
-            v += h / (_MASS * mass(t)) * (u * gain(t) - against)
+            v += h / (_MASS * mass(t)) * (u * gain(t) - against + force(t))
             q += h * v
     random = np.random.default_rng(6)
     noisy = effort + 0.05 * random.standard_normal(n)
@@ -106,3 +115,20 @@ def test_the_component_is_told_by_the_force_that_hangs_on_it(
     found = signatures(track, refit(track, nominal).fit)
     assert found[0].component == component
     assert found[0].share > 0.7
+
+
+def test_a_shaking_floor_is_heard_though_the_longest_recording_lacks_something_else() -> None:
+    def drifts(t: float) -> float:
+        return 1.0 + 0.1 * math.sin(2.0 * math.pi * 0.7 * t)
+
+    def shakes(t: float) -> float:
+        return 2.0 * math.sin(2.0 * math.pi * 31.0 * t)
+
+    nominal = build_model("rigid", {"mass": _MASS}, [term("coulomb", force=_LEVEL), term("viscous", coefficient=_VISCOUS)])
+    longest = _recorded(drifts, _always, _always)
+    shaken = [_recorded(_always, _always, _always, 2500 + 100 * k, shakes) for k in range(4)]
+    track = Track.of([longest, *shaken], 140.0, nominal)
+    found = signatures(track, refit(track, nominal).fit)
+    assert (found[0].component, found[0].title) == ("load", "a force that swings at one frequency")
+    # Sine and cosine of each recording: their clocks are not one.
+    assert found[0].n_coefficients == 10

@@ -36,6 +36,7 @@ _ROWS = 6000  # that a fit uses at most
 _MOST_WAVES = 25.0  # cycles over the travel, from _FEWEST_WAVES on,
 _FEWEST_WAVES = 0.7
 _DETUNED = 0.2  # of a cycle, by which neighbouring ones differ over the travel
+_FEWEST_SWINGS = 8  # in a run, of a force that swings at one frequency
 _LAGS = 12  # widths of a force that lags behind the position
 _KNOTS = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # of the travel, from where on such a force may pull
 
@@ -210,14 +211,18 @@ def _slopes(track: Track, time: Sequence[Array]) -> Array:
 
 
 def _tone(track: Track, time: Sequence[Array], missing: Array, free: Sequence[Array]) -> Array:
-    """A sine and a cosine at the frequency at which most force is missing, for each run, where it is ``free`` to move."""
+    """A sine and a cosine at the frequency at which most force is missing, for each run, where it is ``free`` to move.
+
+    All runs are heard: in the longest the axis may rest, or do something else that lacks more.
+    """
     parts = track.split(missing)
-    longest = max(range(len(parts)), key=lambda k: parts[k].shape[0])
-    step = track.runs[longest].sample_time
-    n = parts[longest].shape[0]
-    power = np.abs(np.fft.rfft(parts[longest] * np.hanning(n), 4 * n)) ** 2
-    power[: 4 * 8] = 0.0  # slower than eight swings is a drift
-    frequency = float(np.fft.rfftfreq(4 * n, step)[int(np.argmax(power))])
+    n = 4 * max(part.shape[0] for part in parts)
+    power = np.zeros(n // 2 + 1)
+    for part in parts:
+        own = np.abs(np.fft.rfft(part * np.hanning(part.shape[0]), n)) ** 2
+        own[: _FEWEST_SWINGS * n // part.shape[0]] = 0.0  # slower is a drift
+        power += own
+    frequency = float(np.fft.rfftfreq(n, track.runs[0].sample_time)[int(np.argmax(power))])
     waves = []
     for k in range(len(time)):
         for function in (np.sin, np.cos):

@@ -51,6 +51,7 @@ _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
 _KEPT = 0.4  # of what a grown model took off where it was fitted, to be found on the recordings held back
 _FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is missing is known the worse
+_OF_TWO = 0.1  # of what is missing, two effects leave at most: what stands in for a third leaves more
 _MANY = 3  # effects at once that still leave something are more likely to have stood in for one
 _SHARED = 1.0 / 3.0  # of what is missing: where so many are missed by less altogether, each does the work of the others
 _FEW = 16  # coefficients, by which a signature is simpler than so many effects
@@ -322,8 +323,8 @@ def _concluded(
 
 
 def _most_left(growth: Growth) -> float:
-    """Share of what is missing that an explanation leaves at most, as well as both are known."""
-    most = UNEXPLAINED if len(growth.steps) < _MANY else _SIGNED
+    """Share of what is missing that an explanation leaves at most, as well as both are known: the less, the more it takes."""
+    most = {0: UNEXPLAINED, 1: UNEXPLAINED, 2: _OF_TWO}.get(len(growth.steps), _SIGNED)
     return min(most + _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300), _HARDLY)
 
 

@@ -37,7 +37,7 @@ from ..identification.gauss_newton import Solution, minimise
 from ..identification.innovations import Run, noise_of, runs_of
 from ..model import Model, Term
 from ..plants import PLANTS
-from ..record import Array, Index, Mask, Record
+from ..record import Array, Index, Record
 from ..simulate import respond, substeps
 from ..threads import n_threads
 from .universe import universe_of
