@@ -108,9 +108,10 @@ def test_what_comes_near_is_told_from_what_is_missing(effect: str, seed: int, na
 
 
 @pytest.mark.long
-def test_one_simple_cause_is_believed_rather_than_three_effects_that_share_its_work() -> None:
-    # The floor shakes at one frequency: a delay, an appendage and bristles together do as the motion does there.
-    case = draw(1919695273, "unknown", "floor_vibration")
+@pytest.mark.parametrize("seed", [1919695273, 798229259])
+def test_one_simple_cause_is_believed_rather_than_effects_that_share_its_work(seed: int) -> None:
+    # The floor shakes at one frequency: a delay and an appendage, with or without bristles, do as the motion does there.
+    case = draw(seed, "unknown", "floor_vibration")
     found = diagnose(case.train, case.validation, case.nominal)
     assert found.findings[0].effect == "unknown"
     assert found.findings[0].component == "load"

@@ -51,9 +51,10 @@ _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
 _KEPT = 0.4  # of what a grown model took off where it was fitted, to be found on the recordings held back
 _FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is missing is known the worse
-_OF_TWO = 0.1  # of what is missing, two effects leave at most: what stands in for a third leaves more
 _MANY = 3  # effects at once that still leave something are more likely to have stood in for one
 _SHARED = 1.0 / 3.0  # of what is missing: where so many are missed by less altogether, each does the work of the others
+_IN_PART = 0.6  # of what several explain: where they are missed by less, they do each other's work in part, and
+_AS_MUCH = 0.9  # of what they explain is as much
 _FEW = 16  # coefficients, by which a signature is simpler than so many effects
 _SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, something unknown remains however little is known of the floor
@@ -270,8 +271,7 @@ def _concluded(
     plain = growth.unhelped or growth
     beside = growth.beyond > 0.0 or plain is not growth
     if missing and (rest > _SIGNED or doubtful or far_off or beside or len(growth.steps) >= _MANY):
-        shared = len(findings) >= _MANY and sum(each.share for each in findings) < _SHARED
-        likely, of_all = _signature_of(searched, plain, max(rest, plain.rest), shared)
+        likely, of_all = _signature_of(searched, plain, max(rest, plain.rest), [each.share for each in findings])
         # Where one signature explains more than several effects do together, these have only stood in for it: a force that
         # swings at one frequency goes with the motion it makes there as a delay, a mode and bristles might.
         stand_in = of_all and len(findings) > 1
@@ -323,8 +323,8 @@ def _concluded(
 
 
 def _most_left(growth: Growth) -> float:
-    """Share of what is missing that an explanation leaves at most, as well as both are known: the less, the more it takes."""
-    most = {0: UNEXPLAINED, 1: UNEXPLAINED, 2: _OF_TWO}.get(len(growth.steps), _SIGNED)
+    """Share of what is missing that an explanation leaves at most, as well as both are known."""
+    most = UNEXPLAINED if len(growth.steps) < _MANY else _SIGNED
     return min(most + _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300), _HARDLY)
 
 
@@ -568,11 +568,12 @@ def _unlearnt(where: Where, alone: OnlyThere, scored: Validation) -> Finding:
     )
 
 
-def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shared: bool) -> tuple[Signature, bool]:
+def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shares: Sequence[float]) -> tuple[Signature, bool]:
     """The signature of what is missing, and True where it is to be believed rather than what was grown.
 
-    It is to be believed where it explains more, and where several effects do each other's work (``shared``), of which none
-    would be missed much, and the signature explains most of it by itself in one simple way.
+    It is to be believed where it explains more, and where it is simple and the effects do each other's work, which take
+    ``shares`` away beside each other: where of three or more none would be missed much and it explains most by itself, and
+    where two take far less than they explain together and it explains nearly as much.
 
     The signature is that of all that is missing, by the observers to which it stands out; or that of what is left, where the
     grown model explains more and the signature most of what that leaves.
@@ -586,7 +587,12 @@ def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shared: 
     whole = agreed([signatures(track, state.fit, () if growth.steps else growth.last) for track, state in clear])
     # What hardly explains anything has no say in what is left either.
     # Whatever is missing in friction goes with the force that it balances: that says nothing.
-    simple = shared and whole.component != FRICTION and whole.share > _MOSTLY and whole.n_coefficients <= _FEW
+    least = 1.0
+    if len(shares) > 1 and sum(shares) < _IN_PART * (1.0 - rest):
+        least = _AS_MUCH * (1.0 - rest)
+    if len(shares) >= _MANY and sum(shares) < _SHARED:
+        least = _MOSTLY
+    simple = whole.component != FRICTION and whole.share > least and whole.n_coefficients <= _FEW
     if not growth.steps or whole.share > 1.0 - rest or rest > _HARDLY or simple:
         return whole, True
     track = clear[0][0]
