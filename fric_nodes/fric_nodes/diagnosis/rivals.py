@@ -51,6 +51,7 @@ _AS_A_SPRING = 8  # iterations
 _FITTED_OUT = 3  # of such rivals
 _FACTORS = (0.25, 0.5, 2.0, 4.0)  # by which values are moved, from which they are fitted again
 _AGAIN = 4  # iterations
+_GIVES = (0.03, 0.3, 3.0)  # of the gap, that stops give under the typical force
 _FURTHER = 12  # iterations of a fit by a law that goes further
 _ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
 OF_FLOOR = 0.15  # what a term has to take off, as a share of the floor
@@ -125,6 +126,9 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         if fitted[k].left > much:
             fitted[k] = _extended(track, state, fitted[k], found, scales)
     fitted = _with_play(track, state, fitted, found, scales)
+    fitted = _side_by_side(track, fitted, found.unpaid)
+    if to_beat > much and fitted and fitted[0].left > much:
+        fitted = [*fitted, *_that_give(track, state, fitted[0], found, scales)]
     fitted = _side_by_side(track, fitted, found.unpaid)
     if to_beat > much:
         fitted = _side_by_side(track, _fitted_out(track, state, fitted, found, scales), found.unpaid)
@@ -283,6 +287,36 @@ def _as_springs(track: Track, state: State, rival: Rival, found: Screening, scal
     model = rival.fit.model.with_terms(spring if each is stops[0] else each for each in rival.fit.model.terms)
     fit = track.fit(model, free_names(model), _AS_A_SPRING, bounds_of(model, scales))
     return [_rival(track, state, offer, fit, found)]
+
+
+def _that_give(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> list[Rival]:
+    """The gap of ``rival`` between stops that give, fitted from several stiffnesses; nothing where it has none, or they do.
+
+    Where a fit of such stops begins they lack much unless their stiffness is near, so that hard ones are offered in their place.
+    """
+    gaps = [each for each in rival.fit.model.terms if each.effect.play is not None and each.effect.link is None]
+    offer = next(((each,) for each in (*found.tried, *found.laws) if _is_stop(each.column.term.effect)), None)
+    if len(rival.offer) != 1 or rival.effect.play is None or offer is None or len(gaps) != 1:
+        return []
+    effect = offer[0].column.term.effect
+    given = dict(zip((p.name for p in gaps[0].effect.parameters), gaps[0].values, strict=True))
+    screened = dict(zip((p.name for p in effect.parameters), offer[0].column.term.values, strict=True))
+    gap = next(given[p.name] for p in gaps[0].effect.parameters if p.dimension == "x")
+    fits = []
+    for give in _GIVES:
+        values = [
+            scales.level / (give * gap) if p.dimension == "F/x" else given.get(p.name, screened[p.name])
+            for p in effect.parameters
+        ]
+        terms = [Term(effect, tuple(values)) if each is gaps[0] else each for each in rival.fit.model.terms]
+        model = rival.fit.model.with_terms(terms)
+        fits.append(track.fit(model, free_names(model), _FURTHER, bounds_of(model, scales)))
+    best = min(fits, key=lambda fit: float(fit.residual @ fit.residual))
+    return [_rival(track, state, offer, best, found)]
+
+
+def _is_stop(effect: Effect) -> bool:
+    return effect.link is not None and effect.play is not None
 
 
 def _parts_bodies(effect: Effect) -> bool:
