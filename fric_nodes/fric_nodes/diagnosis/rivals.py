@@ -292,13 +292,15 @@ def _as_springs(track: Track, state: State, rival: Rival, found: Screening, scal
 def _that_give(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> list[Rival]:
     """The gap of ``rival`` between stops that give, fitted from several stiffnesses; nothing where it has none, or they do.
 
-    Where a fit of such stops begins they lack much unless their stiffness is near, so that hard ones are offered in their place.
+    A fit of such stops begins with much that is missing unless their stiffness is near: hard ones would be offered instead.
     """
     gaps = [each for each in rival.fit.model.terms if each.effect.play is not None and each.effect.link is None]
     offer = next(((each,) for each in (*found.tried, *found.laws) if _is_stop(each.column.term.effect)), None)
     if len(rival.offer) != 1 or rival.effect.play is None or offer is None or len(gaps) != 1:
         return []
     effect = offer[0].column.term.effect
+    if effect.id in [each.effect.id for each in rival.fit.model.terms]:
+        return []
     given = dict(zip((p.name for p in gaps[0].effect.parameters), gaps[0].values, strict=True))
     screened = dict(zip((p.name for p in effect.parameters), offer[0].column.term.values, strict=True))
     gap = next(given[p.name] for p in gaps[0].effect.parameters if p.dimension == "x")
