@@ -7,6 +7,8 @@ import pytest
 from fric_nodes.diagnosis.along import Along
 from fric_nodes.diagnosis.candidates import candidates, scales_of
 from fric_nodes.diagnosis.fitting import refit, with_room
+from fric_nodes.diagnosis.other_laws import laws_further
+from fric_nodes.diagnosis.result import listed
 from fric_nodes.diagnosis.rivals import implausible
 from fric_nodes.diagnosis.screen import Promise, screen
 from fric_nodes.diagnosis.track import Track
@@ -92,3 +94,20 @@ def test_beside_a_transmission_a_period_is_told_along_the_motion() -> None:
     assert float(periods[np.argmin(np.abs(np.log(periods / period)))]) in kept
     best = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False).tried[0]
     assert best.column.term.effect.id == "ripple"
+
+
+def test_a_spring_is_taken_further_by_as_much_as_the_force_would_show() -> None:
+    time = np.arange(4000) * 1e-3
+    record = Record(time, 0.1 * np.sin(3.0 * time), 5.0 * np.cos(3.0 * time), source="swings")
+    scales = scales_of(Track.of([record], 45.0, build_model("rigid", {"mass": 2.0}, [])))
+    (further,) = laws_further(term("compliance", stiffness=3e4, damping=7.0), scales)
+    assert (further.effect.id, further.effect.law) == ("compliance", "hardening")
+    given = dict(zip([p.name for p in further.effect.parameters], further.values, strict=True))
+    assert (given["stiffness"], given["damping"]) == (3e4, 7.0)
+    deflection = scales.level / 3e4
+    assert given["hardening"] * deflection**3 == pytest.approx(scales.level)
+    assert list(laws_further(term("coulomb", force=4.0), scales)) == []
+
+
+def test_many_effects_are_told_one_after_another() -> None:
+    assert [listed(names) for names in ([], ["a"], ["a", "b"], ["a", "b", "c"])] == ["", "a", "a and b", "a, b and c"]

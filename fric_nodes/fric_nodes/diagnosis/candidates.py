@@ -25,7 +25,10 @@ from ..record import Array
 from .track import Track, smooth
 from .universe import worth_trying
 
-__all__ = ["Candidate", "Scales", "candidates", "fewest_cycles", "scales_of"]
+__all__ = ["FRICTION", "Candidate", "Scales", "candidates", "fewest_cycles", "scales_of"]
+
+FRICTION = "guideway friction"
+"""The component that rubs."""
 
 _SMALL = 0.1  # of the friction level, the size of a linear effect in a trial
 _DAMPED = 0.1  # damping ratio of a mode that fades within a few periods
@@ -257,8 +260,8 @@ def place_of(effect: Effect) -> str:
     words = {
         Place.COMMAND_PATH: "command path",
         Place.TRANSMISSION: "transmission",
-        Place.SLIP_LEVEL: "guideway friction",
-        Place.SLIP_DYNAMICS: "guideway friction",
+        Place.SLIP_LEVEL: FRICTION,
+        Place.SLIP_DYNAMICS: FRICTION,
         Place.FORCE: "load",
         Place.SENSOR: "sensor",
     }

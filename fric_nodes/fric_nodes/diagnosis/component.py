@@ -21,14 +21,11 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array
-from .candidates import place_of
+from .candidates import FRICTION, place_of
 from .screen import Tried
 from .track import Fit, Motion, Track
 
-__all__ = ["FRICTION", "Signature", "agreed", "signatures"]
-
-FRICTION = "guideway friction"
-"""The component that rubs."""
+__all__ = ["Signature", "agreed", "signatures"]
 
 _SPAN = 0.25  # [s], of the steps in which something changes with time
 _REST = 0.01  # of the speed, below which a body rests

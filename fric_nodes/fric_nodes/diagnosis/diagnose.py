@@ -27,8 +27,8 @@ from ..model import Model
 from ..record import Array, Record
 from ..threads import linear_algebra_in_one
 from .blocks import one_sided
-from .candidates import Scales, candidates, place_of, scales_of
-from .component import FRICTION, Signature, agreed, signatures
+from .candidates import FRICTION, Scales, candidates, place_of, scales_of
+from .component import Signature, agreed, signatures
 from .confidence import AS_LIKELY, UNEXPLAINED, confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, free_names, refit

@@ -25,7 +25,7 @@ from ..identification.static_maps.weighted import as_normal
 from ..instrument import Finding as Check
 from ..model import Model, Term
 from ..record import Array, Mask, Record
-from .candidates import place_of
+from .candidates import FRICTION, place_of
 from .confidence import AS_LIKELY, UNEXPLAINED, unknown_confidence
 from .locate import Where, direction
 from .result import Diagnosis, Estimate, Finding, Grown, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
@@ -446,7 +446,7 @@ def _unknown(why: str, where: Where, scored: Validation, rest: float) -> Finding
         confidence=unknown_confidence(rest),
         runner_up=None,
         where=where,
-        component="guideway friction",
+        component=FRICTION,
         share=rest,
         evidence=why,
         parameters={},

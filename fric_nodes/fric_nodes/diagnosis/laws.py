@@ -9,18 +9,15 @@ what they were.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from ..effect import Effect
-from ..effects import EFFECTS
-from ..model import Term
 from .fitting import State, refit
+from .other_laws import laws_beside
 from .settle import Step
 from .track import Track
-from .universe import worth_trying
 
-__all__ = ["laws_beside", "with_best_laws"]
+__all__ = ["with_best_laws"]
 
 _BETTER = 0.3  # of what is left, that another law has to take off: what another effect explains, it explains better
 
@@ -42,23 +39,3 @@ def with_best_laws(track: Track, state: State, steps: Sequence[Step], tell: Call
         found[number] = replace(step, term=best.fit.model.prefixes[place], after=max(step.after - state.left + best.left, 0.0))
         state = best
     return state, found
-
-
-def laws_beside(held: Term) -> Iterator[Term]:
-    """Terms of the same effect with laws that aren't tried otherwise and whose values follow from those of ``held``."""
-    given = dict(zip((p.name for p in held.effect.parameters), held.values, strict=True))
-    for effect in EFFECTS.values():
-        if effect.id != held.effect.id or effect.key == held.effect.key or effect in worth_trying() or effect.near:
-            continue
-        if all(p.name in given or p.default is not None for p in effect.parameters):
-            yield _taken_over(effect, given)
-
-
-def _taken_over(effect: Effect, given: dict[str, float]) -> Term:
-    values = []
-    for p in effect.parameters:
-        # A shape means something else in every law.
-        value = p.default if p.name not in given or p.shape else given[p.name]
-        assert value is not None
-        values.append(float(value))
-    return Term(effect, tuple(values))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,7 @@ __all__ = [
     "RunnerUp",
     "Unexplained",
     "Validation",
+    "listed",
 ]
 
 FORMAT = "fric-report/1"
@@ -204,7 +205,7 @@ class Diagnosis:
                     f"Something is missing that only the recording held back shows: the refitted model leaves an NOE of "
                     f"{v.noe_refit:.3g} % there, and the instruments alone leave {v.noise_floor:.3g} %; it sits here: {where}."
                 )
-            helpful = " and ".join(each.title for each in self.findings[1:])
+            helpful = listed([each.title for each in self.findings[1:]])
             left = ""
             if first and len(self.findings) == 2 and first.share < _HARDLY_ANY:
                 left = f" What explains it, {helpful}, does so hardly better than something else would."
@@ -214,7 +215,7 @@ class Diagnosis:
                 left = f" Of its energy {100.0 * first.share:.2g} % stay beside what helps: {helpful}."
             return f"Something is missing, and no known effect explains it; it sits here: {where}.{left}"
         named = (each for each in self.findings if each.effect != "unknown")
-        names = " and ".join(f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in named)
+        names = listed([f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in named])
         return f"Missing: {names}; with it the NOE on unseen data falls from {v.noe_refit:.3g} % to {v.noe_augmented:.3g} %."
 
     @property
@@ -276,6 +277,11 @@ class Diagnosis:
         }
         found: dict[str, Any] = _finite(report)
         return found
+
+
+def listed(names: Sequence[str]) -> str:
+    """A, B and C."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _where(where: Where | None) -> dict[str, Any]:

@@ -12,9 +12,9 @@ from ..threads import mapped
 from .along import Along
 from .candidates import Scales
 from .fitting import Beginning, State, begun, bounds_of, free_names, is_driven, shaken, unseen
+from .other_laws import laws_further
 from .screen import Screening, Tried
 from .track import Fit, Track
-from .universe import extensions
 
 __all__ = [
     "BY_CHANCE",
@@ -232,30 +232,14 @@ def _extended(track: Track, state: State, rival: Rival, found: Screening, scales
     for place, held in enumerate(rival.fit.model.terms):
         if held.effect not in [each.column.term.effect for each in rival.offer]:
             continue
-        for law in extensions(held.effect):
-            term = _taken_further(held, law, scales)
+        for term in laws_further(held, scales):
             model = rival.fit.model.with_terms(term if k == place else each for k, each in enumerate(rival.fit.model.terms))
             fit = track.fit(model, free_names(model), _FURTHER, bounds_of(model, scales))
             other = _rival(track, state, rival.offer, fit, found)
-            dearer = price_of(law, state.excess) - price_of(held.effect, state.excess)
+            dearer = price_of(term.effect, state.excess) - price_of(held.effect, state.excess)
             if best.left - other.left > max(OF_FLOOR * state.floor, dearer):
                 best = replace(other, dear=other.dear + dearer)
     return best
-
-
-def _taken_further(held: Term, law: Effect, scales: Scales) -> Term:
-    """``held`` by a ``law`` that goes further: a little, under the typical force."""
-    given = dict(zip((p.name for p in held.effect.parameters), held.values, strict=True))
-    values = []
-    for p in law.parameters:
-        if p.name in given:
-            values.append(given[p.name])
-        elif p.dimension == "F/x^3":
-            stiffness = next(given[other.name] for other in held.effect.parameters if other.dimension == "F/x")
-            values.append(stiffness**3 / scales.level**2)
-        else:
-            values.append(p.lower if p.default is None else p.default)
-    return Term(law, tuple(values))
 
 
 def _with_play(track: Track, state: State, rivals: list[Rival], found: Screening, scales: Scales) -> list[Rival]:

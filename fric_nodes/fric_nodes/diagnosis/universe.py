@@ -22,7 +22,7 @@ from ..model import Model, Term
 from ..plant import Plant
 from ..record import Array
 
-__all__ = ["Universe", "common_effects", "extensions", "universe_of", "worth_trying"]
+__all__ = ["Universe", "common_effects", "universe_of", "worth_trying"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,20 +86,6 @@ def worth_trying() -> tuple[Effect, ...]:
         if not effect.near
         and (effect.usual or effect.id not in usual or (effect.neutral is not None and usual[effect.id].neutral is None))
     )
-
-
-@lru_cache(maxsize=64)
-def extensions(effect: Effect) -> tuple[Effect, ...]:
-    """Other laws of ``effect`` of which its own is the case where some further strength is nothing."""
-    own = {p.name for p in effect.parameters}
-    found = []
-    for other in EFFECTS.values():
-        more = [p for p in other.parameters if p.name not in own]
-        if other.id != effect.id or other.near or not more or own - {p.name for p in other.parameters}:
-            continue
-        if all(p.lower == 0.0 and not p.positive and not p.shape for p in more):
-            found.append(other)
-    return tuple(found)
 
 
 def universe_of(model: Model) -> Universe:

@@ -1,0 +1,69 @@
+"""Terms of the same effect by other laws, with values that follow from those of the law that is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+
+from ..effect import Effect
+from ..effects import EFFECTS
+from ..model import Term
+from ..parameter import Parameter
+from .candidates import Scales
+from .universe import worth_trying
+
+__all__ = ["laws_beside", "laws_further"]
+
+
+def laws_beside(held: Term) -> Iterator[Term]:
+    """By laws that aren't tried otherwise, where all that they ask for is known or has a default."""
+    given = _given(held)
+    for law in EFFECTS.values():
+        if law.id != held.effect.id or law.key == held.effect.key or law in worth_trying() or law.near:
+            continue
+        # A shape means something else in every law.
+        known = {p.name: given[p.name] for p in law.parameters if p.name in given and not p.shape}
+        if all(p.name in known or p.default is not None for p in law.parameters):
+            yield _taken_over(law, known, lambda p: p.default)
+
+
+def laws_further(held: Term, scales: Scales) -> Iterator[Term]:
+    """By laws of which its own is the case where some further strength is nothing: with a little of that."""
+    given = _given(held)
+
+    def little(p: Parameter) -> float:
+        # Bent as the typical force bends the linear spring, it is twice as strong as that.
+        if p.dimension == "F/x^3":
+            stiffness = next(given[other.name] for other in held.effect.parameters if other.dimension == "F/x")
+            return stiffness**3 / scales.level**2
+        return p.lower if p.default is None else p.default
+
+    for law in _further(held.effect):
+        yield _taken_over(law, given, little)
+
+
+@lru_cache(maxsize=64)
+def _further(effect: Effect) -> tuple[Effect, ...]:
+    own = {p.name for p in effect.parameters}
+    found = []
+    for other in EFFECTS.values():
+        more = [p for p in other.parameters if p.name not in own]
+        if other.id != effect.id or other.near or not more or own - {p.name for p in other.parameters}:
+            continue
+        if all(p.lower == 0.0 and not p.positive and not p.shape for p in more):
+            found.append(other)
+    return tuple(found)
+
+
+def _given(held: Term) -> dict[str, float]:
+    return dict(zip((p.name for p in held.effect.parameters), held.values, strict=True))
+
+
+def _taken_over(law: Effect, given: dict[str, float], else_: Callable[[Parameter], float | None]) -> Term:
+    """A term by ``law`` with the values ``given``, and what ``else_`` says for the others."""
+    values = []
+    for p in law.parameters:
+        value = given[p.name] if p.name in given else else_(p)
+        assert value is not None
+        values.append(float(value))
+    return Term(law, tuple(values))
