@@ -173,7 +173,8 @@ class _Equations:
         scale = np.linalg.norm(matrix, axis=0)
         scale[scale == 0.0] = 1.0
         lower = np.array([-np.inf if name == "bias" else 0.0 for name in self.names])
-        answer = lsq_linear(matrix / scale, target, bounds=(lower, np.full(len(self.names), np.inf)))
+        with np.errstate(invalid="ignore"):  # scipy's own: nothing times the infinite way to a bound that isn't there
+            answer = lsq_linear(matrix / scale, target, bounds=(lower, np.full(len(self.names), np.inf)))
         return float(2.0 * answer.cost), dict(zip(self.names, (answer.x / scale).tolist(), strict=True))
 
 
