@@ -312,3 +312,24 @@ def test_a_light_axis_with_a_steep_stribeck_curve_neither_jumps_nor_gains_energy
     np.testing.assert_allclose(coarse.velocity, fine.velocity, atol=0.01 * np.max(fine.velocity))
     down = simulate(model, np.zeros(400), step, velocity=0.5)
     assert np.all(np.diff(np.abs(down.velocity)) <= 0.0)
+
+
+def test_where_friction_falls_faster_than_the_step_allows_the_balance_of_forces_still_holds() -> None:
+    """Several mean velocities fit such a step, or none in that direction: lines through two trials would lead astray."""
+    mass, coulomb, surplus, stribeck, viscous, step = 2.46, 1.48, 3.0, 7.7e-4, 13.2, 2e-3
+    assert step / (2.0 * mass) * surplus / stribeck * np.sqrt(2.0 / np.e) > 1.0  # the steepest fall of the curve
+    model = axis(mass, coulomb, surplus, stribeck, viscous)
+    random = np.random.default_rng(0)
+    slid = 0
+    for v_0, force in zip(random.uniform(-4.0, 4.0, 20_000) * stribeck, random.uniform(-6.0, 6.0, 20_000), strict=True):
+        _, velocity, _ = run(model, np.array([force]), step, v=float(v_0))
+        v_1 = float(velocity[-1])
+        most = abs(force) + coulomb + surplus + viscous * max(abs(v_0), abs(v_1))
+        assert abs(v_1 - v_0) <= step / mass * most
+        if v_0 * v_1 <= 0.0:
+            continue
+        slid += 1
+        w = 0.5 * (v_0 + v_1)
+        level = coulomb + surplus * np.exp(-((w / stribeck) ** 2))
+        assert mass * (v_1 - v_0) / step == pytest.approx(force - np.sign(w) * level - viscous * w, abs=0.01 * most)
+    assert slid > 5000

@@ -12,7 +12,8 @@ m v^2/2, so the energy balance closes to rounding in every step. The equation is
 from the velocity before the step and from the velocity that the force there leads to. The line through the last two trials also
 gives the friction force and the states that belong to its root, so that the balance closes although the law itself isn't
 evaluated once more; trials end when the root moves by less than 1/200 of the velocity's change, where what the line neglects is
-far below the error of the midpoint rule.
+far below the error of the midpoint rule. Where friction falls with speed so steeply that there are several roots, or the law
+jumps, the lines may lead anywhere; after a dozen trials the root is closed in on by halves instead.
 
 With slip dynamics a step in which the velocity changes its sign is split where it does, since |v| has a kink there.
 
@@ -68,7 +69,11 @@ def solve(
     force_up = 0.0
     w_a = w_b = v
     force_a = friction_a = change = 0.0
-    for _ in range(53):
+    # A root lies between two trials of which the one lacks velocity and the other has too much; none are known yet.
+    low = high = v
+    below = above = False
+    reach = 0.0
+    for trial in range(120):
         if not RIGID and not first:
             for j in range(n):
                 s.z_next[n + j] = s.z_next[j]
@@ -84,20 +89,35 @@ def solve(
             first = False
             w_b = v + half * rest
             change = abs(w_b - v)
+            reach = w_b - v
+            below, above = rest > 0.0, rest < 0.0
             force_a, friction_a = force_b, friction_b
             continue
         excess = w_b - v - half * (u - force_b - friction_b)
+        if excess < 0.0:
+            low, below = w_b, True
+        elif excess > 0.0:
+            high, above = w_b, True
         rise = w_b - w_a + half * (force_b - force_a + friction_b - friction_a)
         share = -excess / rise if rise != 0.0 else 0.0
         move = share * (w_b - w_a)
-        if abs(move) <= 5e-3 * change:
+        if trial < 12 and abs(move) <= 5e-3 * change:
             if not RIGID:
                 for j in range(n):
                     s.z_next[j] += share * (s.z_next[j] - s.z_next[n + j])
             return w_b + move, friction_b + share * (friction_b - friction_a)
         w_a, force_a, friction_a = w_b, force_b, friction_b
-        w_b += move
-    return w_a, friction_a
+        if trial < 12:
+            w_b += move
+        elif below and above:
+            if excess == 0.0 or abs(high - low) <= 5e-3 * change:
+                break
+            w_b = 0.5 * (low + high)
+        else:
+            reach *= 2.0
+            w_b = v + reach
+    # Whatever the law is doing there, what accelerates the body is what is left of the force.
+    return w_a, u - force_a - (w_a - v) / half
 
 
 @kernel
