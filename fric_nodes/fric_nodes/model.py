@@ -44,6 +44,11 @@ class Term:
     effect: Effect
     values: tuple[float, ...]
 
+    @property
+    def by_name(self) -> dict[str, float]:
+        """The values by the names of their parameters."""
+        return dict(zip((p.name for p in self.effect.parameters), self.values, strict=True))
+
 
 @dataclass(frozen=True)
 class Model:

@@ -67,7 +67,6 @@ _LEFT_UNSEEN = 0.05  # of what is missing in the recordings held back: what has 
 _STANDS_OUT = 10.0  # times the floor
 _LOCATING = 600.0  # [rad/s], for spans of time
 _LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of the physics
-_LEARN_IT = "learn from the recording held back, too, and hold another one back that goes where it went"
 _LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that moves the body
 
 
@@ -307,10 +306,10 @@ def _concluded(
         checks=tuple(checks),
         nominal=_nominal_part(nominal, begin_fit),
         findings=tuple(findings),
-        rejected=_rejected(growth, begin, scales_of(track)),
+        rejected=_rejected(growth, begin, scales_of(track), learnt),
         validation=scored,
         unexplained=unexplained,
-        next_experiment=_next(findings, growth) if alone is None else _LEARN_IT,
+        next_experiment=_next(findings, alone is not None),
         model=end,
         refit=begin,
         given=nominal,
@@ -515,9 +514,8 @@ def _left(held: Track, residual: Array, floor: Sequence[Array]) -> list[Array]:
 
 
 def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation, rest: float, stand_in: bool) -> Finding:
-    tried = sorted((s for s in growth.last), key=lambda each: each.left)
-    best = tried[0].column.term.effect if tried else None
-    beside = f"; the best of them, {best.title}, doesn't explain it" if best is not None else ""
+    best = min(growth.last, key=lambda each: each.left, default=None)
+    beside = f"; the best of them, {best.column.term.effect.title}, doesn't explain it" if best is not None else ""
     evidence = (
         f"{100 * rest:.3g} % of the missing force's energy is left by every combination of known effects{beside}; "
         f"it looks most like {likely.title}, which would take {100 * likely.share:.3g} % of it"
@@ -527,44 +525,38 @@ def _unknown(where: Where, likely: Signature, growth: Growth, scored: Validation
             f"it looks most like {likely.title}, which by itself takes {100 * likely.share:.3g} % of the energy away that "
             f"is missing; known effects leave {100 * rest:.3g} % of it, but only several that do each other's work"
         )
-    return Finding(
-        effect="unknown",
-        law="",
-        title="something that no known effect explains",
-        confidence=unknown_confidence(rest),
-        runner_up=RunnerUp(best.id, round(1.0 - unknown_confidence(rest), 4)) if best is not None else None,
-        where=where,
-        component=likely.component,
-        share=rest,
-        evidence=evidence,
-        parameters={},
-        noe_before=scored.noe_refit,
-        noe_after=scored.noe_augmented,
-    )
+    return _by_none("something that no known effect explains", where, likely, best, rest, evidence, scored)
 
 
 def _unlearnt(where: Where, alone: OnlyThere, scored: Validation) -> Finding:
     """What only the recordings held back show."""
-    best = None if alone.best is None else alone.best.column.term.effect
     evidence = (
         f"the recordings learnt from lack nothing, and the one held back leaves an NOE of {scored.noe_refit:.3g} %, "
         f"{alone.noe:.3g} % when the model is fitted to it, too, where the instruments leave {scored.noise_floor:.3g} %; "
         f"it looks most like {alone.likely.title}, which would take {100 * alone.likely.share:.3g} % of it"
     )
-    sure = unknown_confidence(1.0)
+    title = "something that only the recording held back shows"
+    return _by_none(title, where, alone.likely, alone.best, 1.0, evidence, scored)
+
+
+def _by_none(
+    title: str, where: Where, likely: Signature, best: Tried | None, share: float, evidence: str, scored: Validation
+) -> Finding:
+    """The finding that no effect explains a ``share`` of what is missing, ``best`` being the one that comes closest."""
+    sure = unknown_confidence(share)
     return Finding(
         effect="unknown",
         law="",
-        title="something that only the recording held back shows",
+        title=title,
         confidence=sure,
-        runner_up=None if best is None else RunnerUp(best.id, round(1.0 - sure, 4)),
+        runner_up=None if best is None else RunnerUp(best.column.term.effect.id, round(1.0 - sure, 4)),
         where=where,
-        component=alone.likely.component,
-        share=1.0,
+        component=likely.component,
+        share=share,
         evidence=evidence,
         parameters={},
         noe_before=scored.noe_refit,
-        noe_after=scored.noe_refit,
+        noe_after=scored.noe_augmented,
     )
 
 
@@ -578,12 +570,11 @@ def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shares: 
     The signature is that of all that is missing, by the observers to which it stands out; or that of what is left, where the
     grown model explains more and the signature most of what that leaves.
     """
-    looks = [
-        (track, refit(track, growth.begin.fit.model, max_iterations=_FIRST_FIT))
-        for track in sorted(tracks, key=lambda each: each.bandwidth)
-    ]
+    # Shares are held against those of the grown model, which are as its own observer sees them: that one is asked first.
+    ordered = sorted(tracks, key=lambda each: (each.bandwidth != growth.track.bandwidth, each.bandwidth))
+    looks = [(track, refit(track, growth.begin.fit.model, max_iterations=_FIRST_FIT)) for track in ordered]
     clear = [(track, state) for track, state in looks if state.excess > _STANDS_OUT * state.floor]
-    clear = clear or [look for look in looks if look[0].bandwidth == growth.track.bandwidth]
+    clear = clear or looks[:1]
     whole = agreed([signatures(track, state.fit, () if growth.steps else growth.last) for track, state in clear])
     # What hardly explains anything has no say in what is left either.
     # Whatever is missing in friction goes with the force that it balances: that says nothing.
@@ -600,16 +591,15 @@ def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shares: 
     return (left if left.share > _MOSTLY else whole), False
 
 
-def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, ...]:
-    """Every effect that is not in the grown model, and why."""
+def _rejected(growth: Growth, begin: Model, scales: Scales, learnt: bool) -> tuple[Rejected, ...]:
+    """Every effect that isn't in the grown model, and why; without ``learnt`` the recordings learnt from lack nothing."""
     there = {held.effect.id for held in growth.end.fit.model.terms}
     found: dict[str, str] = dict(growth.rejected)
     excess = max(growth.begin.excess, 1e-300)
-    nothing = not growth.steps and growth.begin.excess <= _MISMATCH * growth.begin.floor
     first: Sequence[Tried] = growth.steps[0].screened if growth.steps else growth.last
     for each in first:
         name = each.column.term.effect.id
-        if name not in there and name not in found and not nothing:
+        if name not in there and name not in found and learnt:
             found[name] = f"takes {_percent(each.gain, excess)} away at first order where it was not fitted"
     for step in growth.steps:
         for rival in step.rivals:
@@ -622,7 +612,7 @@ def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, .
     for effect in EFFECTS.values():
         if effect.id in there or effect.id in found:
             continue
-        if nothing and effect.id in tried:
+        if not learnt and effect.id in tried:
             found[effect.id] = "nothing is missing that it could explain"
             continue
         found[effect.id] = (
@@ -633,7 +623,10 @@ def _rejected(growth: Growth, begin: Model, scales: Scales) -> tuple[Rejected, .
     return tuple(Rejected(name, why) for name, why in found.items())
 
 
-def _next(findings: Sequence[Finding], growth: Growth) -> str:
+def _next(findings: Sequence[Finding], only_held_back: bool) -> str:
+    """The experiment that tells most, in words."""
+    if only_held_back:
+        return "learn from the recording held back, too, and hold another one back that goes where it went"
     for finding in findings:
         effect: Effect | None = next((each for each in EFFECTS.values() if each.id == finding.effect), None)
         if effect is not None and finding.runner_up is not None and finding.runner_up.effect in effect.looks_like:

@@ -17,7 +17,7 @@ __all__ = ["laws_beside", "laws_further"]
 
 def laws_beside(held: Term) -> Iterator[Term]:
     """By laws that aren't tried otherwise, where all that they ask for is known or has a default."""
-    given = _given(held)
+    given = held.by_name
     for law in EFFECTS.values():
         if law.id != held.effect.id or law.key == held.effect.key or law in worth_trying() or law.near:
             continue
@@ -29,7 +29,7 @@ def laws_beside(held: Term) -> Iterator[Term]:
 
 def laws_further(held: Term, scales: Scales) -> Iterator[Term]:
     """By laws of which its own is the case where some further strength is nothing: with a little of that."""
-    given = _given(held)
+    given = held.by_name
 
     def little(p: Parameter) -> float:
         # Bent as the typical force bends the linear spring, it is twice as strong as that.
@@ -53,10 +53,6 @@ def _further(effect: Effect) -> tuple[Effect, ...]:
         if all(p.lower == 0.0 and not p.positive and not p.shape for p in more):
             found.append(other)
     return tuple(found)
-
-
-def _given(held: Term) -> dict[str, float]:
-    return dict(zip((p.name for p in held.effect.parameters), held.values, strict=True))
 
 
 def _taken_over(law: Effect, given: dict[str, float], else_: Callable[[Parameter], float | None]) -> Term:

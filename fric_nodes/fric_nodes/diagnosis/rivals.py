@@ -25,6 +25,7 @@ __all__ = [
     "Rival",
     "earns",
     "implausible",
+    "is_stop",
     "mass_off",
     "name_of",
     "price_of",
@@ -128,8 +129,8 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
     fitted = _with_play(track, state, fitted, found, scales)
     fitted = _side_by_side(track, fitted, found.unpaid)
     if to_beat > much and fitted and fitted[0].left > much:
-        fitted = [*fitted, *_that_give(track, state, fitted[0], found, scales)]
-    fitted = _side_by_side(track, fitted, found.unpaid)
+        giving = _that_give(track, state, fitted[0], found, scales)
+        fitted = _side_by_side(track, [*fitted, *giving], found.unpaid) if giving else fitted
     if to_beat > much:
         fitted = _side_by_side(track, _fitted_out(track, state, fitted, found, scales), found.unpaid)
     return [*(_shaped(track, state, rival, found, scales) for rival in fitted[:1]), *fitted[1:]]
@@ -260,11 +261,11 @@ def _with_play(track: Track, state: State, rivals: list[Rival], found: Screening
 def _as_springs(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> list[Rival]:
     """Stops without play as the spring that was screened; nothing where none was."""
     offer = next(((each,) for each in (*found.tried, *found.laws) if _is_spring(each.column.term.effect)), None)
-    stops = [each for each in rival.fit.model.terms if each.effect.play is not None and each.effect.link is not None]
+    stops = [each for each in rival.fit.model.terms if is_stop(each.effect)]
     if offer is None or len(stops) != 1:
         return []
     effect = offer[0].column.term.effect
-    given = dict(zip((p.name for p in stops[0].effect.parameters), stops[0].values, strict=True))
+    given = stops[0].by_name
     if not {p.name for p in effect.parameters} <= set(given):
         return []
     spring = Term(effect, tuple(given[p.name] for p in effect.parameters))
@@ -279,14 +280,13 @@ def _that_give(track: Track, state: State, rival: Rival, found: Screening, scale
     A fit of such stops begins with much that is missing unless their stiffness is near: hard ones would be offered instead.
     """
     gaps = [each for each in rival.fit.model.terms if each.effect.play is not None and each.effect.link is None]
-    offer = next(((each,) for each in (*found.tried, *found.laws) if _is_stop(each.column.term.effect)), None)
+    offer = next(((each,) for each in (*found.tried, *found.laws) if is_stop(each.column.term.effect)), None)
     if len(rival.offer) != 1 or rival.effect.play is None or offer is None or len(gaps) != 1:
         return []
     effect = offer[0].column.term.effect
     if effect.id in [each.effect.id for each in rival.fit.model.terms]:
         return []
-    given = dict(zip((p.name for p in gaps[0].effect.parameters), gaps[0].values, strict=True))
-    screened = dict(zip((p.name for p in effect.parameters), offer[0].column.term.values, strict=True))
+    given, screened = gaps[0].by_name, offer[0].column.term.by_name
     gap = next(given[p.name] for p in gaps[0].effect.parameters if p.dimension == "x")
     fits = []
     for give in _GIVES:
@@ -301,7 +301,8 @@ def _that_give(track: Track, state: State, rival: Rival, found: Screening, scale
     return [_rival(track, state, offer, best, found)]
 
 
-def _is_stop(effect: Effect) -> bool:
+def is_stop(effect: Effect) -> bool:
+    """True for stops that give: play and spring in one."""
     return effect.link is not None and effect.play is not None
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..model import Model, Term
 from .candidates import Scales, candidates, scales_of
 from .fitting import State, bounds_of, free_names, refit, without_term
-from .rivals import OF_FLOOR, Rival, implausible, name_of, price_of, rivals_of
+from .rivals import OF_FLOOR, Rival, implausible, is_stop, name_of, price_of, rivals_of
 from .screen import Tried, screen
 from .track import Track, Twin
 from .twin import twins
@@ -113,13 +113,13 @@ def _unless_worse(done: Settled) -> Settled:
 def merged(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step]]:
     """A play and a spring beside each other as the one effect that is both, where that explains as much."""
     transmission = [held for held in state.fit.model.terms if held.effect.play is not None or held.effect.link is not None]
-    both = [each for each in worth_trying() if each.play is not None and each.link is not None]
+    both = [each for each in worth_trying() if is_stop(each)]
     if len(transmission) != 2 or all(held.effect.play is None for held in transmission):
         return state, steps
     given: dict[str, float] = {}
     for held in transmission:
-        for p, value in zip(held.effect.parameters, held.values, strict=True):
-            given[p.name] = given.get(p.name, 0.0) + value  # two plays in a row are one
+        for name, value in held.by_name.items():
+            given[name] = given.get(name, 0.0) + value  # two plays in a row are one
     effect = next((each for each in both if {p.name for p in each.parameters} == set(given)), None)
     if effect is None:
         return state, steps
