@@ -22,6 +22,11 @@ def _in_window(t: float) -> bool:
     return t % 5.0 > 3.2
 
 
+def _in_short_window(t: float) -> bool:
+    """Edges between those of any even grid, some close together."""
+    return any(first < t < last for first, last in ((2.13, 2.46), (5.37, 5.91), (9.12, 9.44), (12.88, 13.33), (16.61, 17.4)))
+
+
 def _recorded(
     friction: Callable[[float], float],
     gain: Callable[[float], float],
@@ -105,6 +110,8 @@ def test_observers_are_heard_alike() -> None:
         (lambda t: 1.6 if _in_window(t) else 1.0, _always, _always, "guideway friction"),
         (_always, lambda t: 0.75 if _in_window(t) else 1.0, _always, "command path"),
         (_always, _always, lambda t: 1.8 if t > 9.0 else 1.0, "load"),
+        (lambda t: 1.4 if _in_short_window(t) else 1.0, _always, _always, "guideway friction"),
+        (_always, lambda t: 0.75 if _in_short_window(t) else 1.0, _always, "command path"),
     ],
 )
 def test_the_component_is_told_by_the_force_that_hangs_on_it(

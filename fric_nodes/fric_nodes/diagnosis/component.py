@@ -22,12 +22,14 @@ import numpy as np
 from ..model import Model
 from ..record import Array
 from .candidates import FRICTION, place_of
+from .pieces import amplitudes_of, in_pieces
 from .screen import Tried
 from .track import Fit, Motion, Track
 
 __all__ = ["Signature", "agreed", "signatures"]
 
-_SPAN = 0.25  # [s], of the steps in which something changes with time
+_LEVEL, _GAIN = "friction whose level changes with time", "an actuator whose gain changes with time"
+_SPAN = 0.25  # [s], of the steps in which something changes with time, at least
 _REST = 0.01  # of the speed, below which a body rests
 _ROWS = 6000  # that a fit uses at most
 _MOST_WAVES = 25.0  # cycles over the travel, from _FEWEST_WAVES on,
@@ -82,12 +84,20 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
     independent = max(track.independent, 50.0)
     held = _Motions(track.motion, [run.effort for run in track.runs], track.time)
     found: dict[str, Signature] = {}
-    for component, title, columns in _ways(track, held, missing, fit.model):
-        n = columns.shape[1]
-        left = _left(np.concatenate([nominal, columns[::stride]], axis=1), target)
+
+    def hear(component: str, title: str, columns: Array, n: int) -> None:
+        left = _left(np.concatenate([nominal, columns], axis=1), target)
         signature = _marked(component, title, left / max(alone, 1e-300), n, independent)
         if title not in found or signature.evidence < found[title].evidence:
             found[title] = signature
+
+    for component, title, columns in _ways(track, held, missing, fit.model):
+        hear(component, title, columns[::stride], columns.shape[1])
+    time = _times(track, held.time, stride)
+    for component, title, signal in _stepping(held, fit.model):
+        left = alone * (1.0 - found[title].share)
+        column = track.seen(signal)[::stride]
+        hear(component, title, *in_pieces(column, time, nominal, target, left, independent, _SPAN))
     # A limit or a gap promises at first order what it doesn't keep.
     best = min((each for each in tried if each.column.amplitudes), key=lambda each: each.left, default=None)
     if best is not None:
@@ -120,11 +130,7 @@ def _marked(component: str, title: str, left: float, n: int, independent: float)
 
 def _left(columns: Array, target: Array) -> float:
     """Sum of squares of ``target`` that the columns leave."""
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns[:, size > 0.0] / size[size > 0.0]
-    normal = columns.T @ columns + 1e-9 * np.eye(columns.shape[1])
-    weight = np.linalg.solve(normal, columns.T @ target)
-    return float(np.sum((target - columns @ weight) ** 2))
+    return float(np.sum((target - columns @ amplitudes_of(columns, target)) ** 2))
 
 
 def _rubbing(model: Model, held: _Motions) -> list[Array]:
@@ -137,17 +143,33 @@ def _rubbing(model: Model, held: _Motions) -> list[Array]:
     ]
 
 
+def _directions(held: _Motions, model: Model) -> tuple[list[Array], list[Array]]:
+    """Direction of the velocity, zero at rest; and where the axis is free to move: a contact that sticks takes up what acts."""
+    fast = max(float(np.quantile(np.abs(np.concatenate([each.velocity for each in held.motion])), 0.9)), 1e-12)
+    way = [np.tanh(each.velocity / (_REST * fast)) for each in held.motion]
+    sticks = any(each.effect.level is not None for each in model.terms)
+    return way, [np.abs(each) if sticks else np.ones_like(each) for each in way]
+
+
+def _stepping(held: _Motions, model: Model) -> Iterator[tuple[str, str, list[Array]]]:
+    """Component, way, and the force, were it always as large, of what may change from one moment to the next.
+
+    Dirt in a guideway, a supply that dips: only around the edges do they differ, so these are to be where they are.
+    """
+    way, free = _directions(held, model)
+    yield FRICTION, _LEVEL, way
+    if not model.plant.led:
+        yield "command path", _GAIN, [moves * u for moves, u in zip(free, held.effort, strict=True)]
+
+
 def _ways(track: Track, held: _Motions, missing: Array, model: Model) -> Iterator[tuple[str, str, Array]]:
     """Component, way, and its columns, shape ``(n, n_columns)`` each."""
     rate = [each.velocity for each in held.motion]
-    fast = max(float(np.quantile(np.abs(np.concatenate(rate)), 0.9)), 1e-12)
-    way = [np.tanh(v / (_REST * fast)) for v in rate]
-    sticks = any(each.effect.level is not None for each in model.terms)
-    free = [np.abs(each) if sticks else np.ones_like(each) for each in way]
+    way, free = _directions(held, model)
     guideway, load = FRICTION, "load"
     steps, steadily = _spans(track, held.time), _slopes(track, held.time)
-    yield guideway, "friction whose level changes with time", _changing(track, way, steps)
-    yield guideway, "friction whose level changes with time", _changing(track, _rubbing(model, held), steps)
+    yield guideway, _LEVEL, _changing(track, way, steps)
+    yield guideway, _LEVEL, _changing(track, _rubbing(model, held), steps)
     # A film thins and thickens, where dirt or a supply comes and goes.
     yield guideway, "friction whose slope changes with time", _changing(track, rate, steps)
     yield guideway, "friction whose slope changes with time", _changing(track, rate, steadily)
@@ -155,7 +177,7 @@ def _ways(track: Track, held: _Motions, missing: Array, model: Model) -> Iterato
     yield guideway, "friction that goes with the motor's force", _seen(track, [driven])
     if not model.plant.led:  # what is measured at a contact is behind the drive and the mass
         given = [moves * u for moves, u in zip(free, held.effort, strict=True)]
-        yield "command path", "an actuator whose gain changes with time", _changing(track, given, steps)
+        yield "command path", _GAIN, _changing(track, given, steps)
         acceleration = [each.acceleration for each in held.motion]
         yield load, "a mass that changes with time", _changing(track, acceleration, steps)
     yield load, "a force that swings at one frequency", _tone(track, held.time, missing, free)
@@ -174,6 +196,13 @@ def _seen(track: Track, signals: Sequence[Sequence[Array]]) -> Array:
 def _changing(track: Track, signal: Sequence[Array], weights: Array) -> Array:
     """Columns of ``signal``, one value per sample of each run, by the ``weights`` over time of each."""
     return weights * track.seen(list(signal))[:, None]
+
+
+def _times(track: Track, time: Sequence[Array], stride: int) -> list[Array]:
+    """Time of every ``stride``-th row [s], per run."""
+    rows = track.joined(time)
+    run = np.repeat(np.arange(len(time)), [part.shape[0] for part in track.split(rows)])[::stride]
+    return [rows[::stride][run == k] for k in range(len(time))]
 
 
 def _knots(track: Track, time: Sequence[Array]) -> tuple[Array, int]:
