@@ -124,6 +124,18 @@ def test_the_component_is_told_by_the_force_that_hangs_on_it(
     assert found[0].share > 0.7
 
 
+def test_what_pulls_whichever_way_the_axis_moves_is_no_friction() -> None:
+    nominal = build_model("rigid", {"mass": _MASS}, [term("coulomb", force=_LEVEL), term("viscous", coefficient=_VISCOUS)])
+    record = _recorded(_always, _always, _always, force=lambda t: -0.9 * _LEVEL if _in_window(t) else 0.0)
+    track = Track.of([record], 45.0, nominal)
+    found = signatures(track, refit(track, nominal).fit)
+    assert found[0].component == "load"
+    friction = next(each for each in found if each.component == "guideway friction")
+    # With edges free at every reversal friction comes near, by many more numbers.
+    assert friction.n_coefficients > 2 * found[0].n_coefficients
+    assert found[0].share > 0.9
+
+
 def test_a_shaking_floor_is_heard_though_the_longest_recording_lacks_something_else() -> None:
     def drifts(t: float) -> float:
         return 1.0 + 0.1 * math.sin(2.0 * math.pi * 0.7 * t)

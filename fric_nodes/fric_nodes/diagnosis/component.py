@@ -2,13 +2,13 @@
 
 A force has the signature of what makes it, also where its law isn't known. Each component has some ways in which it can act,
 free in what a law would fix: friction whose level or slope changes with time as it likes, friction that goes with the motor's
-force; an actuator whose gain changes with time as it likes; a load whose mass changes with time as it likes, a force that
-swings at one frequency whatever the axis does, a force that hangs on the position and lags behind it; a sensor whose reading
-is off by a wave along the travel. What a contact takes up where the body rests isn't missing there. Each is fitted, together
-with the nominal parameters, to what is missing, and what it explains is held against the number of its coefficients (Schwarz's
-criterion); the best names the component. The effects of the registry take part: where one of them comes closest, its component
-is named. Observers of several speeds see different sides of it, a slow one the level of a force, a fast one how a contact
-sticks: they are heard alike.
+force; an actuator whose gain changes with time as it likes; a load whose mass or whose pull changes with time as it likes, a
+force that swings at one frequency whatever the axis does, a force that hangs on the position and lags behind it; a sensor whose
+reading is off by a wave along the travel. What a contact takes up where the body rests isn't missing there. Each is fitted,
+together with the nominal parameters, to what is missing, and what it explains is held against the number of its coefficients
+(Schwarz's criterion); the best names the component. The effects of the registry take part: where one of them comes closest, its
+component is named. Observers of several speeds see different sides of it, a slow one the level of a force, a fast one how a
+contact sticks: they are heard alike.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from .track import Fit, Motion, Track
 __all__ = ["Signature", "agreed", "signatures"]
 
 _LEVEL, _GAIN = "friction whose level changes with time", "an actuator whose gain changes with time"
+_FORCE = "a force that changes with time"
 _SPAN = 0.25  # [s], of the steps in which something changes with time, at least
 _REST = 0.01  # of the speed, below which a body rests
 _ROWS = 6000  # that a fit uses at most
@@ -95,7 +96,7 @@ def signatures(track: Track, fit: Fit, tried: Sequence[Tried] = ()) -> list[Sign
         hear(component, title, columns[::stride], columns.shape[1])
     time = _times(track, held.time, stride)
     for component, title, signal in _stepping(held, fit.model):
-        left = alone * (1.0 - found[title].share)
+        left = alone * (1.0 - found[title].share) if title in found else alone
         column = track.seen(signal)[::stride]
         hear(component, title, *in_pieces(column, time, nominal, target, left, independent, _SPAN))
     # A limit or a gap promises at first order what it doesn't keep.
@@ -154,10 +155,12 @@ def _directions(held: _Motions, model: Model) -> tuple[list[Array], list[Array]]
 def _stepping(held: _Motions, model: Model) -> Iterator[tuple[str, str, list[Array]]]:
     """Component, way, and the force, were it always as large, of what may change from one moment to the next.
 
-    Dirt in a guideway, a supply that dips: only around the edges do they differ, so these are to be where they are.
+    Dirt in a guideway, a supply that dips: only around the edges do they differ, so these are to be where they are. Friction
+    with edges at every reversal is any force that comes and goes; what pulls whichever way the axis moves needs far fewer.
     """
     way, free = _directions(held, model)
     yield FRICTION, _LEVEL, way
+    yield "load", _FORCE, free
     if not model.plant.led:
         yield "command path", _GAIN, [moves * u for moves, u in zip(free, held.effort, strict=True)]
 
