@@ -116,6 +116,17 @@ def test_a_score_counts_confusion_rates_and_goals() -> None:
     assert worse in score.missed
 
 
+def test_variants_have_goals_five_points_wider_for_shares_and_the_same_for_all_else() -> None:
+    outcomes = [_outcome("weak", ("ripple",), (_found("ripple"),)), _outcome("nothing", (), ())]
+    usual, other = ({each.name: each.goal for each in scored(outcomes, name).figures} for name in ("standard", "form"))
+    changed = {name: goal for name, goal in other.items() if goal != usual[name]}
+    assert changed == {
+        "weak single effects, named first": ">= 0.7",
+        "nothing missing, but something found (false alarms)": "<= 0.07",
+        "expected calibration error of the confidence": "<= 0.1",
+    }
+
+
 def test_components_come_from_the_registry() -> None:
     assert components_of("delay") == {"command path"}
     assert components_of("stribeck") == {"guideway friction"}

@@ -8,6 +8,7 @@ from fric_nodes.control.feedforward import Feedforward
 from fric_nodes.effects import EFFECTS
 from fric_nodes.model import build_model, term
 from fric_nodes.simulate import Simulator, predict_force, simulate
+from scipy.linalg import expm
 
 
 def passed(key: str, *p: float, commands: np.ndarray, steps: np.ndarray) -> np.ndarray:
@@ -44,7 +45,32 @@ def test_the_lag_is_the_exact_mean_over_any_step(seed: int) -> None:
         after = command + (f - command) * np.exp(-h / T)
         expected.append(command - T * (after - f) / h)
         f = after
-    assert passed("actuator_lag", T, commands=u, steps=steps) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert passed("actuator_lag/first_order", T, commands=u, steps=steps) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.1, 0.7, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.6, 10.0])
+def test_the_lag_of_second_order_is_the_exact_mean_over_any_step(damping: float) -> None:
+    """Against the matrix exponential of the filter with the integral of its force as a third state."""
+    rng = np.random.default_rng(5)
+    T = 0.004
+    steps = np.exp(rng.uniform(np.log(1e-7), np.log(0.1), 60))
+    u = rng.normal(size=60)
+    state, expected = np.zeros(2), []
+    for h, command in zip(steps, u, strict=True):
+        # (f, T df/dt, integral of f over t/T, u) by t/T
+        rates = np.array([[0, 1, 0, 0], [-1, -2 * damping, 0, 1], [1, 0, 0, 0], [0, 0, 0, 0]], dtype=float)
+        after = expm(rates * h / T) @ np.array([*state, 0.0, command])
+        expected.append(after[2] * T / h)
+        state = after[:2]
+    assert passed("actuator_lag/second_order", T, damping, commands=u, steps=steps) == pytest.approx(expected, rel=1e-8, abs=1e-9)
+
+
+def test_two_equal_lags_in_a_row_are_one_of_second_order() -> None:
+    T, h, n = 0.003, 1e-5, 3000
+    first = passed("actuator_lag/first_order", T, commands=np.ones(n), steps=np.full(n, h))
+    second = passed("actuator_lag/first_order", T, commands=first, steps=np.full(n, h))
+    together = passed("actuator_lag/second_order", T, 1.0, commands=np.ones(n), steps=np.full(n, h))
+    assert together == pytest.approx(second, abs=2e-3)  # the first hands on its mean over each step
 
 
 @pytest.mark.parametrize("delay", [1e-5, 0.4e-3, 1e-3, 3.7e-3, 0.03, 0.06])

@@ -33,7 +33,9 @@ def test_curves_over_velocity(v: float) -> None:
     s = -1.0 if v < 0 else 1.0
     assert level("coulomb")(v, 4.0) == 4.0
     assert force("viscous")(v, 10.0) == pytest.approx(10.0 * v)
-    assert force("quadratic_drag")(v, 3.0) == pytest.approx(3.0 * v**2 * s)
+    assert force("quadratic_drag/quadratic")(v, 3.0) == pytest.approx(3.0 * v**2 * s)
+    assert force("quadratic_drag/power")(v, 3.0, 1.75) == pytest.approx(3.0 * v**2 / abs(v) ** 0.25 * s if v else 0.0)
+    assert force("quadratic_drag/power")(s, 3.0, 2.6) == pytest.approx(3.0 * s)  # at 1 x/s whatever the exponent is
     assert force("bias")(v, -3.0) == -3.0
     assert level("asymmetry")(v, 0.5, 3.0) == 0.5 * s
     assert force("asymmetry")(v, 0.5, 3.0) == pytest.approx(3.0 * abs(v))

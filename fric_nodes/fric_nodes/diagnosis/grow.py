@@ -288,7 +288,7 @@ def _added(
         # What is left may show best to another observer.
         track, state = best_track(tracks, best.fit.model, 6, floors, track)
         state, steps = merged(track, begin, state, steps)
-        if state.excess > _LITTLE * begin.excess and state.excess > NOTHING * state.floor:
+        if state.excess > NOTHING * state.floor and state.excess > min(_LITTLE * begin.excess, CLEARLY * state.floor):
             state, steps = with_best_laws(track, state, steps, tell)
         scales = scales_of(track)
         little = max(_LITTLE * refit(track, begin.fit.model, max_iterations=4).excess, FLOOR_KNOWN * state.floor)

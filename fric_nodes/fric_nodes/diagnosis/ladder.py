@@ -19,7 +19,7 @@ import numpy as np
 from ..effects import EFFECTS
 from ..identification.result import Options
 from ..identification.static_map import curve_terms, settled_means
-from ..identification.static_maps.curve import Candidate, Choice, Curve, Points, choose, fitted
+from ..identification.static_maps.curve import STRIBECK_LAWS, Candidate, Choice, Curve, Points, choose, fitted
 from ..identification.static_maps.load import MeanForce
 from ..identification.static_maps.weighted import as_normal
 from ..instrument import Finding as Check
@@ -55,6 +55,8 @@ class Ladder:
 def ladder_of(train: Sequence[Record], validation: Sequence[Record], nominal: Model) -> Ladder | None:
     """The means of the recordings, where each is one speed and nothing else tells more; else None."""
     have = {held.effect.id for held in nominal.terms}
+    if not all(held.effect.usual or held.effect.law in ("", *STRIBECK_LAWS) for held in nominal.terms):
+        return None
     if nominal.plant.id not in ("rigid", "contact") or not {"coulomb", "bias"} <= have <= {"coulomb", "bias", *_FLAGS}:
         return None
     if not all(_one_way(record) for record in (*train, *validation)):

@@ -34,6 +34,7 @@ __all__ = [
 ]
 
 FAR_OFF = 0.1  # of what is missing, for a mass twice or half the one that was given
+_NEAR = 1.2  # times as large or small as the given one, or less
 _LEAST_SHARE = 0.1  # of the mass behind a spring: half of it counts as much as a mass twice the given one
 _PAIRS_FITTED = 2
 _PAIR_BETTER = 0.5  # of what the best single effect leaves, for a pair to be tried
@@ -429,10 +430,12 @@ def implausible(mass: float, model: Model) -> float:
 def mass_off(mass: float, model: Model) -> float:
     """What it speaks against ``model`` to be far from a ``mass`` [F s^2/x] that was given, as a share of what is missing.
 
-    A body that is far too light under a force that is taken away from it lacks little, whatever the machine does.
+    A body that is far too light under a force that is taken away from it lacks little, whatever the machine does. A mass that
+    is near speaks against nothing: it was fitted by a model that lacks something.
     """
     appended = sum(p.value for p in model.parameters() if "." in p.name and p.declaration.dimension == "F s^2/x")
-    return FAR_OFF * math.log2((model.total_inertia + appended) / mass) ** 2
+    off, near = math.log2((model.total_inertia + appended) / mass) ** 2, math.log2(_NEAR) ** 2
+    return FAR_OFF * max(off - near, 0.0) / (1.0 - near)
 
 
 def name_of(model: Model, effect: Effect) -> str:

@@ -196,7 +196,9 @@ def _takes_its_place(track: Track, begin: State, without: State, state: State, o
         return False
     dearer = implausible(track.mass, rival.fit.model) - implausible(track.mass, state.fit.model)
     more = max(dearer, 0.0) * max(begin.excess - without.excess, 0.0)
-    return own - rival.score - more > max(OF_FLOOR * state.floor, _TO_STAY * without.excess)
+    # Twins that stick and slip each in its own way leave more than a recording does: no floor is higher than what is left.
+    floor = min(state.floor, state.left, rival.left)
+    return own - rival.score - more > max(OF_FLOOR * floor, _TO_STAY * without.excess)
 
 
 def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scales: Scales) -> tuple[State, list[Step]]:

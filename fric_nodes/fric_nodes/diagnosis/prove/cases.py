@@ -43,6 +43,7 @@ _MIXED_SHARES = {"mixed": 0.5, "unknown": 0.5}  # what is found beside something
 _RATE = {"half-rate": 0.5, "double-rate": 2.0}
 _MODERATE = (1.0, 15.0)
 _ATTEMPTS = 25
+_LARGEST_ASYMMETRY = 0.8  # of the Coulomb friction: with more, both together are another machine's friction of one direction
 _REFERENCE_TEMPERATURE = 25.0
 
 
@@ -254,6 +255,8 @@ def _finished(
     order: Order, bench: Bench, nominal: Nominal, physics: Physics, alone: list[float], forms: list[int],
     signals: frozenset[str], random: np.random.Generator,
 ) -> Case:  # fmt: skip
+    if abs(physics.asymmetry) > _LARGEST_ASYMMETRY * physics.coulomb > 0.0:
+        raise Unreachable("friction that would be none in one direction")
     left = bench.remainder(physics, nominal)
     floor = bench.floor(physics)
     _check(order.kind, left.noe, floor)

@@ -92,7 +92,7 @@ def hold(
         found = _all(pool, own_fit, structures, progress, "true structures fitted")
     own = {key["number"]: noe for key, noe in zip(named, found, strict=True)}
     outcomes = [outcome_of(key, case_folder(out, key["number"]), own.get(key["number"])) for key in keys]
-    return Examination(outcomes, scored(outcomes), hash_of_key, time.perf_counter() - began)
+    return Examination(outcomes, scored(outcomes, variant), hash_of_key, time.perf_counter() - began)
 
 
 def _claim(out: Path, orders: Sequence[Order]) -> None:

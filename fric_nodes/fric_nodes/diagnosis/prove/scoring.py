@@ -11,7 +11,8 @@ of the named spans over the length of that set.
 *Confidence* is calibrated when of the findings with a confidence of c a share c is right; the expected calibration error is
 the mean over ten bins of what lies between the two, weighted by the number of findings. Every finding of every case counts.
 
-Rates come with Wilson's interval of 95 %.
+Rates come with Wilson's interval of 95 %. Where the truth's laws are others than the candidates', or the sampling is, the goals of
+shares are wider by five points.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ __all__ = ["Found", "Outcome", "Rate", "Score", "calibration_bins", "components_
 _GRID = 0.05  # [s]
 _BINS = 10
 _Z = 1.959963984540054
+_SLACK = 0.05  # by which the goals of shares are wider in variants of the examination
 
 _COMPONENTS = {
     Place.COMMAND_PATH: frozenset({"command path"}),
@@ -264,8 +266,15 @@ def calibration_bins(pairs: Sequence[tuple[float, bool]]) -> tuple[tuple[float, 
     return tuple(bins)
 
 
-def scored(outcomes: Sequence[Outcome]) -> Score:
-    """The score of these outcomes."""
+def _widened(goal: str, slack: float) -> str:
+    """``goal``, if there is one, easier by ``slack``."""
+    relation, _, limit = goal.partition(" ")
+    return goal and f"{relation} {float(limit) + (slack if relation == '<=' else -slack):.3g}"
+
+
+def scored(outcomes: Sequence[Outcome], variant: str = "standard") -> Score:
+    """The score of these outcomes of an examination of the kind ``variant``."""
+    slack = 0.0 if variant == "standard" else _SLACK
     by_kind = {
         kind: [each for each in outcomes if each.kind == kind]
         for kind in ("moderate", "weak", "pair", "unknown", "nothing", "mixed")
@@ -277,7 +286,7 @@ def scored(outcomes: Sequence[Outcome]) -> Score:
         found = Rate(sum(hit(each) for each in cases), len(cases))
         if found.of:
             rates[name] = found
-            figures.append(Figure(name, found.value, "1", goal))
+            figures.append(Figure(name, found.value, "1", _widened(goal, slack)))
 
     rate("single effects of moderate strength, named first", by_kind["moderate"], lambda o: o.right, ">= 0.95")
     rate("weak single effects, named first", by_kind["weak"], lambda o: o.right, ">= 0.75")
@@ -301,7 +310,7 @@ def scored(outcomes: Sequence[Outcome]) -> Score:
     count = sum(n for *_, n in bins)
     if count:
         error = sum(n * abs(confidence - right) for confidence, right, n in bins) / count
-        figures.append(Figure("expected calibration error of the confidence", error, "1", "<= 0.05"))
+        figures.append(Figure("expected calibration error of the confidence", error, "1", _widened("<= 0.05", slack)))
     figures.append(Figure("diagnoses that failed", float(sum(bool(o.failure) for o in outcomes)), "", "<= 0"))
     figures.append(Figure("time of a diagnosis, median", median(o.seconds for o in outcomes), "s"))
     figures.append(Figure("time of a diagnosis, longest", max(o.seconds for o in outcomes), "s"))

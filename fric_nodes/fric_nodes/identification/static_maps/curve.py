@@ -32,12 +32,13 @@ from scipy import stats
 
 from ...record import Array
 
-__all__ = ["Candidate", "Choice", "Curve", "Points", "choose", "columns_of", "fitted"]
+__all__ = ["STRIBECK_LAWS", "Candidate", "Choice", "Curve", "Points", "choose", "columns_of", "fitted"]
 
 _SIGNIFICANT = 0.01
 _DRAWS = 1999
 _VELOCITIES = 40
-_LAWS = ("exponential", "hess_soom")
+STRIBECK_LAWS = ("exponential", "hess_soom")
+"""Laws of a Stribeck effect that a curve can have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,7 +272,7 @@ def _test_stribeck(base: Candidate, points: Points, scatter: float, rng: np.rand
     root = 1.0 / np.sqrt(points.error**2 + scatter**2)
     known = np.linalg.qr(root[:, None] * columns_of(base, points.velocity, 1.0))[0]
     directions = []
-    for law, v_s in product(_LAWS, _velocities(points)):
+    for law, v_s in product(STRIBECK_LAWS, _velocities(points)):
         column = root * np.sign(points.velocity) * _fall(law, points.velocity / float(v_s))
         rest = column - known @ (known.T @ column)
         size = float(np.linalg.norm(rest))
@@ -303,7 +304,7 @@ def choose(points: Points, seed: int = 1, at_least: Candidate | None = None) -> 
     several = points.n_speeds
     viscous = (False, True) if several >= 2 else (False,)
     more = (False, True) if several >= 3 else (False,)
-    laws = ("", *_LAWS) if several >= 4 else ("",)
+    laws = ("", *STRIBECK_LAWS) if several >= 4 else ("",)
     every = [Candidate(v, s, q, a) for v, s, q, a in product(viscous, laws, more, viscous)]
     every = [c for c in every if at_least is None or c.holds(at_least)]
     n = points.velocity.shape[0]

@@ -28,6 +28,8 @@ def command(u: float, h: float, y: Any, i: int, time: float) -> float:
 
 EFFECT = Effect(
     id="actuator_lag",
+    law="first_order",
+    usual=True,
     place=Place.COMMAND_PATH,
     title="lag of the actuator",
     equation="T df/dt = u - f",

@@ -20,6 +20,8 @@ def force(c: Context, coefficient: float) -> float:
 
 EFFECT = Effect(
     id="quadratic_drag",
+    law="quadratic",
+    usual=True,
     place=Place.FORCE,
     title="quadratic drag",
     equation="F = c v |v|",
