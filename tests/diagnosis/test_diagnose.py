@@ -94,6 +94,31 @@ def test_a_shaft_that_hardens_is_no_gap_with_soft_stops() -> None:
 
 
 @pytest.mark.parametrize(
+    ("effect", "law", "seed", "name", "true"),
+    [
+        # A lag of the first order leaves a hundredth, which a delay beside it would nearly explain; two lags of 3.5 ms.
+        ("actuator_lag", "second_order", 1194745386, "actuator_lag.time", 3.4765e-3),
+        # A square leaves a hundredth, which a Stribeck effect beside it would.
+        ("quadratic_drag", "power", 843366905, "quadratic_drag.exponent", 1.75),
+    ],
+)
+def test_what_a_usual_law_leaves_is_no_other_effect(effect: str, law: str, seed: int, name: str, true: float) -> None:
+    case = draw(seed, "moderate", effect, "form")
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert [(each.effect, each.law) for each in found.findings] == [(effect, law)]
+    assert found.findings[0].parameters[name].value == pytest.approx(true, rel=0.03)
+
+
+def test_where_twins_stick_and_slip_far_apart_what_is_left_says_which_rival_is_right() -> None:
+    # Twins leave five times as much as the hysteresis does, the Stribeck effect a third of that.
+    case = draw(326562437, "pair", ("stribeck", "load_dependence"))
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert {each.effect for each in found.findings} == {"stribeck", "load_dependence"}
+    stribeck = next(each for each in found.findings if each.effect == "stribeck")
+    assert stribeck.parameters["stribeck.velocity"].value == pytest.approx(9.437e-3, rel=0.03)
+
+
+@pytest.mark.parametrize(
     ("effect", "seed", "name", "true"),
     [
         # A hysteresis explains nearly as much; the fit of a Stribeck curve half as wide and twice as high goes no further.

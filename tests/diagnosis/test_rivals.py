@@ -9,7 +9,7 @@ from fric_nodes.diagnosis.candidates import candidates, scales_of
 from fric_nodes.diagnosis.fitting import refit, with_room
 from fric_nodes.diagnosis.other_laws import laws_further
 from fric_nodes.diagnosis.result import listed
-from fric_nodes.diagnosis.rivals import implausible
+from fric_nodes.diagnosis.rivals import FAR_OFF, implausible, mass_off
 from fric_nodes.diagnosis.screen import Promise, screen
 from fric_nodes.diagnosis.track import Track
 from fric_nodes.model import Model, Term, build_model, term
@@ -29,6 +29,13 @@ def test_hardly_any_mass_behind_a_spring_counts_as_a_mass_that_is_off() -> None:
     assert light == pytest.approx(implausible(2.0, _axis(4.0, 0.4)))  # half of the least share, twice the mass
     assert implausible(2.0, _axis(2.0, 0.1)) == 0.0
     assert implausible(2.0, build_model("rigid", {"mass": 2.0}, [term("coulomb", force=4.0)])) == 0.0
+
+
+@pytest.mark.parametrize("ratio", [0.84, 1.0, 1.19])
+def test_a_mass_near_the_given_one_speaks_against_nothing(ratio: float) -> None:
+    assert mass_off(2.0, build_model("rigid", {"mass": 2.0 * ratio}, [])) == 0.0
+    assert mass_off(2.0, build_model("rigid", {"mass": 4.0 * ratio}, [])) > 0.5 * FAR_OFF
+    assert mass_off(2.0, build_model("rigid", {"mass": 4.0}, [])) == pytest.approx(FAR_OFF)
 
 
 def test_what_has_passed_for_friction_leaves_it() -> None:

@@ -62,7 +62,8 @@ def test_the_lag_of_second_order_is_the_exact_mean_over_any_step(damping: float)
         after = expm(rates * h / T) @ np.array([*state, 0.0, command])
         expected.append(after[2] * T / h)
         state = after[:2]
-    assert passed("actuator_lag/second_order", T, damping, commands=u, steps=steps) == pytest.approx(expected, rel=1e-8, abs=1e-9)
+    found = passed("actuator_lag/second_order", T, damping, commands=u, steps=steps)
+    assert found == pytest.approx(expected, rel=1e-8, abs=1e-9)
 
 
 def test_two_equal_lags_in_a_row_are_one_of_second_order() -> None:

@@ -67,7 +67,14 @@ _LEFT_UNSEEN = 0.05  # of what is missing in the recordings held back: what has 
 _STANDS_OUT = 3.0  # times the floor: with less, noise is more than a quarter of what there is to explain
 _LOCATING = 600.0  # [rad/s], for spans of time
 _LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of the physics
+_NEGLIGIBLE = 1e-4  # NOE [%]: a force within a thousandth is what steps of any simulation and sampling differ by
 _LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that moves the body
+
+
+_TOO_LITTLE = (
+    f"the refitted model gives the force to within a thousandth of it (an NOE below {_NEGLIGIBLE:g} %): physics that changes "
+    "less is not looked for"
+)
 
 
 class DiagnosisError(InputError):
@@ -244,9 +251,10 @@ def _concluded(
     noe = {name: 100.0 * float(each @ each) / spread for name, each in left.items()}
     noise_floor = 100.0 * _mean_square(floor) / spread
     scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
+    told = noe["refit"] > _NEGLIGIBLE
     learnt = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
     # What the recordings held back don't show has been chance, or has been over before they were made.
-    missing = learnt and (noe["refit"] > (1.0 + _CONFIRMED) * noise_floor or _paired(growth, noe, noise_floor))
+    missing = told and learnt and (noe["refit"] > (1.0 + _CONFIRMED) * noise_floor or _paired(growth, noe, noise_floor))
     if not missing or noe["augmented"] > noe["refit"]:
         gone = (*growth.rejected, *_withdrawn(growth, missing))
         growth = replace(growth, end=growth.begin, steps=(), rejected=gone, beyond=0.0)
@@ -280,7 +288,7 @@ def _concluded(
     unknown = missing and (much or doubtful or stand_in or far_off or beside)
     unexplained = Unexplained(max(rest, growth.beyond), None)
     remains = None
-    alone = None if learnt else only_there(train, validation, held, begin)
+    alone = None if learnt or not told else only_there(train, validation, held, begin)
     if alone is not None:
         remains = _left(held, left["refit"], floor)
         where = locate(held, remains, scales, begin)
@@ -314,7 +322,7 @@ def _concluded(
         refit=begin,
         given=nominal,
         prediction=tuple(_predictions(validation, held, left)),
-        notes=(*corrected, *_reservations(growth, nominal, far_off and bool(growth.steps))),
+        notes=(*corrected, *_reservations(growth, nominal, far_off and bool(growth.steps)), *([] if told else [_TOO_LITTLE])),
         bandwidth=held.bandwidth,
         grown=_grown(growth),
         only_held_back=alone is not None,

@@ -212,7 +212,7 @@ class Diagnosis:
             elif first and helpful and first.share < _HARDLY_ANY:
                 left = f" Several effects explain it only together, each doing part of the others' work: {helpful}."
             elif first and helpful:
-                left = f" Of its energy {100.0 * first.share:.2g} % stay beside what helps: {helpful}."
+                left = f" Of its energy {_percent(first.share)} % stay beside what helps: {helpful}."
             return f"Something is missing, and no known effect explains it; it sits here: {where}.{left}"
         named = (each for each in self.findings if each.effect != "unknown")
         names = listed([f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in named])
@@ -277,6 +277,11 @@ class Diagnosis:
         }
         found: dict[str, Any] = _finite(report)
         return found
+
+
+def _percent(share: float) -> str:
+    """A share in percent, two digits of it; all of it is 100 and not 1e+02."""
+    return f"{100.0 * share:.2g}" if share < 0.995 else "100"
 
 
 def listed(names: Sequence[str]) -> str:

@@ -6,8 +6,8 @@ e = f - u and g = T de/dt, over a step of the length r T under a constant comman
     e(r) = e(0) (C + zeta S) + g(0) S,    g(r) = g(0) (C - zeta S) - e(0) S,
 
 where C and S are exp(-zeta r) times cosh(r s) and sinh(r s)/s with s^2 = zeta^2 - 1, or cos and sin where that is negative.
-The mean of e follows from the equation itself, (g(0) - g(r) + 2 zeta (e(0) - e(r)))/r; over short steps, where these differences
-have no digits left, from its Taylor series. A run starts without force.
+The mean of e follows from the equation itself, (g(0) - g(r) + 2 zeta (e(0) - e(r)))/r; over short steps, where these
+differences have no digits left, from its Taylor series. A run starts without force.
 Source: second-order model of servo valves and current loops, standard in control engineering.
 """
 

@@ -11,8 +11,8 @@ of the named spans over the length of that set.
 *Confidence* is calibrated when of the findings with a confidence of c a share c is right; the expected calibration error is
 the mean over ten bins of what lies between the two, weighted by the number of findings. Every finding of every case counts.
 
-Rates come with Wilson's interval of 95 %. Where the truth's laws are others than the candidates', or the sampling is, the goals of
-shares are wider by five points.
+Rates come with Wilson's interval of 95 %. Where the truth's laws are others than the candidates', or the sampling is, the goals
+of shares are wider by five points.
 """
 
 from __future__ import annotations
