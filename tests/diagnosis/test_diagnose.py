@@ -13,6 +13,7 @@ from fric_nodes.diagnosis.fitting import refit
 from fric_nodes.diagnosis.held_back import only_there
 from fric_nodes.diagnosis.prove import draw
 from fric_nodes.diagnosis.track import Track
+from fric_nodes.model import build_model, term
 from fric_nodes.model_file import model_from_text, model_to_text
 from fric_nodes.report.diagnosis import diagnosis_report
 
@@ -268,3 +269,15 @@ def test_rest_and_missing_force_are_refused() -> None:
     silent = replace(record, effort=np.zeros(record.n_samples))
     with pytest.raises(DiagnosisError, match="no force signal"):
         diagnose([silent], case.validation, case.nominal)
+
+
+def test_a_model_of_another_plant_is_refused_unless_it_holds_the_right_one() -> None:
+    case = draw(3, "nothing")
+    terms = [term("coulomb", force=1.0), term("viscous", coefficient=1.0)]
+    cart = build_model("cart_pendulum", {"cart_mass": 1.0, "pole_mass": 1.0, "length": 0.5, "pole_inertia": 0.08}, terms)
+    with pytest.raises(DiagnosisError, match=r"is of no 'cart_pendulum'.*same terms 0.00.*plant 'rigid'"):
+        diagnose(case.train, case.validation, cart)
+    # A pendulum whose weight comes out at nothing is a mass.
+    found = diagnose(case.train, case.validation, build_model("pendulum", {"inertia": 1.0, "gravity": 10.0}, terms))
+    assert not found.mismatch
+    assert found.model.value("inertia") == pytest.approx(case.key["physics"]["mass"], rel=0.02)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -75,7 +74,6 @@ def diagnose(
     progress(f"reading {len(train) + len(given)} recording(s)")
     records = read_all(train, reading)
     records, kept_apart = (records, read_all(given, reading)) if blocks is None else in_blocks(records, blocks)
-    nominal = replace(nominal, joint=records[0].joint)
     found = find(records, kept_apart, nominal, progress)
     write_diagnosis(out, found, records, kept_apart)
     if as_json:

@@ -16,10 +16,7 @@ import numpy as np
 
 from ..effect import Effect
 from ..effects import EFFECTS
-from ..errors import InputError
-from ..identification import METHODS
 from ..identification.equations import nominal_conditions
-from ..identification.result import IdentificationError, Options
 from ..identification.statistics import sandwich_covariance
 from ..instrument import Finding as Check
 from ..instrument import inspect
@@ -31,22 +28,44 @@ from .candidates import FRICTION, Scales, candidates, place_of, scales_of
 from .component import Signature, agreed, signatures
 from .confidence import AS_LIKELY, UNEXPLAINED, confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
-from .fitting import best_track, bounds_of, free_names, refit
+from .fitting import best_track, bounds_of, refit
 from .grow import Growth, grow, helped
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
 from .locate import Where, locate, moved_back, steady
-from .result import Diagnosis, Estimate, Finding, Grown, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
+from .result import (
+    Diagnosis,
+    Estimate,
+    Finding,
+    Grown,
+    NominalPart,
+    Prediction,
+    Rejected,
+    RunnerUp,
+    Unexplained,
+    Validation,
+    percent,
+)
 from .rivals import FAR_OFF, implausible, mass_off
 from .screen import Tried
-from .settle import FLOOR_KNOWN, Step
+from .settle import FLOOR_KNOWN, Step, is_nothing
+from .start import (
+    BANDWIDTHS,
+    FAST,
+    FIRST_FIT,
+    DiagnosisError,
+    held_as,
+    lateness,
+    refuse_other_plant,
+    spread_of,
+    started,
+    tracks_of,
+)
 from .track import Fit, Track
 from .twin import twins
 
 __all__ = ["DiagnosisError", "diagnose", "refit_noe"]
 
-_BANDWIDTHS = (45.0, 140.0, 400.0)  # [rad/s]
-_FAST = 1.0  # largest product of bandwidth and sample time
 _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
 _KEPT = 0.4  # of what a grown model took off where it was fitted, to be found on the recordings held back
@@ -61,13 +80,13 @@ _HARDLY = 0.6  # with more than this left, something unknown remains however lit
 _TWINS = 5
 _AS_FAST = 8  # iterations of a fit by a faster observer
 _DECIDED = 0.5  # of what the refitted nominal model lacks: with more, twins of the grown one say nothing
-_FIRST_FIT = 6  # iterations, by which starts are compared
 _MOSTLY = 0.5  # of what a grown model leaves, for a signature to say what that is
 _LEFT_UNSEEN = 0.05  # of what is missing in the recordings held back: what has the right structure leaves less there
 _STANDS_OUT = 3.0  # times the floor: with less, noise is more than a quarter of what there is to explain
 _LOCATING = 600.0  # [rad/s], for spans of time
-_LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of the physics
 _NEGLIGIBLE = 1e-4  # NOE [%]: a force within a thousandth is what steps of any simulation and sampling differ by
+_ANY_JOINT = "axis"  # of a model that says nothing of it
+_UNDECIDED = 0.45  # confidence at most, where no parameter of an effect is as large as its own standard error
 _LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that moves the body
 
 
@@ -75,10 +94,6 @@ _TOO_LITTLE = (
     f"the refitted model gives the force to within a thousandth of it (an NOE below {_NEGLIGIBLE:g} %): physics that changes "
     "less is not looked for"
 )
-
-
-class DiagnosisError(InputError):
-    """Recordings or a model that can't be compared."""
 
 
 @linear_algebra_in_one()
@@ -101,6 +116,11 @@ def diagnose(
     tell("checking the instrument")
     checks = inspect(train, nominal)
     train, validation, corrected = _corrected(train, validation, checks)
+    if nominal.joint not in (_ANY_JOINT, train[0].joint):
+        corrected.append(
+            f"the model is of the joint '{nominal.joint}', the recordings of '{train[0].joint}': taken for the same"
+        )
+    nominal = replace(nominal, joint=train[0].joint)
     apart = one_sided(train, validation)
     if apart:
         corrected.append(f"{apart}: what the one shows there the other can't judge")
@@ -111,10 +131,12 @@ def diagnose(
     conditions = nominal_conditions(train) | dict(nominal.nominal)
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
-    tracks, start = _started(nominal, train)
+    tracks, start = started(nominal, train)
+    refuse_other_plant(train, tracks[0], start)
+    corrected += held_as(tracks[0])
     massless = start.total_inertia < _LIGHTEST * nominal.total_inertia
     if massless:  # at first: beside much that is left out inertia may drown
-        tracks, start = _started(nominal, train, as_given=True)
+        tracks, start = started(nominal, train, as_given=True)
     parts = excerpt(tracks, start)
     searched = list(tracks if parts is None else parts.tracks)
     growth = grow(searched, start, tell)
@@ -139,16 +161,10 @@ def refit_noe(model: Model, train: Sequence[Record], validation: Sequence[Record
     """NOE of ``model``, fitted to ``train``, on ``validation`` [%], as an observer of ``bandwidth`` [rad/s] sees it."""
     conditions = nominal_conditions(train) | dict(model.nominal)
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
-    track, state = best_track(_tracks(train, model), model)
-    held = replace(Track.of(validation, bandwidth, model), mass=track.mass)
+    track, state = best_track(tracks_of(train, model, lateness(train, model)), model)
+    held = replace(Track.of(validation, bandwidth, model, track.late), mass=track.mass)
     left = held.residual(state.fit.model)
-    return 100.0 * float(left @ left) / _spread(held)
-
-
-def _spread(track: Track) -> float:
-    """Sum of squares of the recorded force about its mean [F^2]."""
-    effort = track.joined([run.effort for run in track.runs])
-    return float(np.sum((effort - np.mean(effort)) ** 2))
+    return 100.0 * float(left @ left) / spread_of(held)
 
 
 def _refuse(train: Sequence[Record], validation: Sequence[Record]) -> None:
@@ -198,39 +214,6 @@ def _corrected(
     return held, kept_apart, notes
 
 
-def _started(nominal: Model, train: Sequence[Record], as_given: bool = False) -> tuple[list[Track], Model]:
-    """The recordings, followed, and the nominal structure with values that a fit can start from: the given or better ones."""
-    starts = [replace(nominal, standard_errors={})]
-    if not as_given:
-        try:
-            found = METHODS["inverse-dynamics"].fit(starts[0], list(train), Options()).model
-            if np.all(np.isfinite(found.values)):
-                starts.insert(0, found)
-        except (IdentificationError, np.linalg.LinAlgError):
-            pass
-    tracks = _tracks(train, starts[0])
-    bounds = bounds_of(starts[0], scales_of(tracks[0]))
-    fits = [tracks[0].fit(start, free_names(start), _FIRST_FIT, bounds) for start in starts]
-    best = min(fits, key=lambda fit: float(fit.residual @ fit.residual))
-    lacks = float(best.residual @ best.residual) / max(_spread(tracks[0]), 1e-300)
-    if lacks > _LACKS_MUCH and not nominal.plant.led and mass_off(tracks[0].mass, nominal) > FAR_OFF:
-        # Where so much is missing that it makes up a mass of its own, the one given is the better measure.
-        tracks = [replace(track, mass=nominal.total_inertia) for track in tracks]
-    return tracks, best.model
-
-
-def _tracks(train: Sequence[Record], start: Model) -> list[Track]:
-    """The recordings followed at several bandwidths."""
-    step = max(record.sample_time for record in train)
-    allowed = [w for w in _BANDWIDTHS if w * step <= _FAST] or [_FAST / step]
-    if start.plant.led:
-        allowed = [min(_BANDWIDTHS[-1], _FAST / step)]
-    tracks = [Track.of(train, bandwidth, start) for bandwidth in allowed]
-    if not tracks[0].runs:
-        raise DiagnosisError(train[0].source, "has no valid part of 200 samples", "record for longer")
-    return tracks
-
-
 def _concluded(
     train: Sequence[Record],
     validation: Sequence[Record],
@@ -245,8 +228,9 @@ def _concluded(
     held = _shown(validation, growth.track, growth.begin.fit.model, growth.beyond > 0.0)
     track, begin_fit, end_fit = _as_fast(whole, held, growth)
     begin, end = begin_fit.model, _with_errors(track, end_fit)
+    growth, end = _without_nothings(growth, end)
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
-    spread = _spread(held)
+    spread = spread_of(held)
     floor = _floor(held, begin, end, left["refit"])
     noe = {name: 100.0 * float(each @ each) / spread for name, each in left.items()}
     noise_floor = 100.0 * _mean_square(floor) / spread
@@ -254,7 +238,11 @@ def _concluded(
     told = noe["refit"] > _NEGLIGIBLE
     learnt = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
     # What the recordings held back don't show has been chance, or has been over before they were made.
-    missing = told and learnt and (noe["refit"] > (1.0 + _CONFIRMED) * noise_floor or _paired(growth, noe, noise_floor))
+    missing = (
+        told
+        and learnt
+        and (noe["refit"] > (1.0 + _CONFIRMED) * noise_floor or (not held.unsure and _paired(growth, noe, noise_floor)))
+    )
     if not missing or noe["augmented"] > noe["refit"]:
         gone = (*growth.rejected, *_withdrawn(growth, missing))
         growth = replace(growth, end=growth.begin, steps=(), rejected=gone, beyond=0.0)
@@ -391,9 +379,9 @@ def _withdrawn(growth: Growth, missing: bool) -> list[tuple[str, str]]:
 def _shown(validation: Sequence[Record], track: Track, begin: Model, as_track: bool) -> Track:
     """The validation recordings, followed as fast as what is missing still stands out from the floor, or ``as_track`` is."""
     step = max(record.sample_time for record in validation)
-    tried = (track.bandwidth,) if as_track else (*_BANDWIDTHS, track.bandwidth)
-    for bandwidth in sorted({min(w, _FAST / step) for w in tried}, reverse=True):
-        held = replace(Track.of(validation, bandwidth, begin), mass=track.mass)
+    tried = (track.bandwidth,) if as_track else (*BANDWIDTHS, track.bandwidth)
+    for bandwidth in sorted({min(w, FAST / step) for w in tried}, reverse=True):
+        held = replace(Track.of(validation, bandwidth, begin, track.late), mass=track.mass)
         if not held.runs:
             raise DiagnosisError(validation[0].source, "has no valid part of 200 samples", "record for longer")
         left = held.residual(begin)
@@ -415,6 +403,17 @@ def _as_fast(whole: Sequence[Track], held: Track, growth: Growth) -> tuple[Track
     bounds = [bounds_of(fit.model, scales_of(track)) for fit in fits]
     begin, end = (track.fit(fit.model, fit.names, _AS_FAST, among) for fit, among in zip(fits, bounds, strict=True))
     return track, begin, end if growth.steps else begin
+
+
+def _without_nothings(growth: Growth, end: Model) -> tuple[Growth, Model]:
+    """Both without the terms that come out at nothing when they are fitted to what the faster observer sees."""
+    gone = {held.effect.id for held in end.terms if is_nothing(held)} & {step.term for step in growth.steps}
+    if not gone:
+        return growth, end
+    why = tuple((name, "comes out at nothing when it is fitted to all that a fast observer sees") for name in sorted(gone))
+    left = end.with_terms(held for held in end.terms if held.effect.id not in gone)
+    kept = tuple(step for step in growth.steps if step.term not in gone)
+    return replace(growth, steps=kept, rejected=(*growth.rejected, *why)), left
 
 
 def _floor(held: Track, begin: Model, end: Model, lacking: Array) -> list[Array]:
@@ -474,6 +473,8 @@ def _finding(
         for p in end.parameters()
         if p.name.startswith(f"{step.term}.")
     }
+    if parameters and all(each.std is not None and abs(each.value) < each.std for each in parameters.values()):
+        sure = min(sure, _UNDECIDED)
     runner = RunnerUp(rival.effect.id, round(min(1.0 - sure, sure), 4)) if rival is not None else None
     beside = f"; the next best, {rival.effect.title}, {_percent(step.before - rival.left, excess)}" if rival is not None else ""
     evidence = (
@@ -497,12 +498,12 @@ def _finding(
 
 
 def _percent(part: float, whole: float) -> str:
-    return f"{100.0 * max(part, 0.0) / whole:.3g} %"
+    return f"{percent(max(part, 0.0) / whole, 3)} %"
 
 
 def _locating(validation: Sequence[Record], held: Track, growth: Growth) -> Track:
     """The validation recordings, followed as fast as spans of time ask for."""
-    return Track.of(validation, min(_LOCATING, _FAST / held.runs[0].step[0]), growth.begin.fit.model)
+    return Track.of(validation, min(_LOCATING, FAST / held.runs[0].step[0]), growth.begin.fit.model, held.late)
 
 
 def _difference(fast: Track, before: Model, after: Model) -> list[Array]:
@@ -580,7 +581,7 @@ def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shares: 
     """
     # Shares are held against those of the grown model, which are as its own observer sees them: that one is asked first.
     ordered = sorted(tracks, key=lambda each: (each.bandwidth != growth.track.bandwidth, each.bandwidth))
-    looks = [(track, refit(track, growth.begin.fit.model, max_iterations=_FIRST_FIT)) for track in ordered]
+    looks = [(track, refit(track, growth.begin.fit.model, max_iterations=FIRST_FIT)) for track in ordered]
     clear = [(track, state) for track, state in looks if state.excess > _STANDS_OUT * state.floor]
     clear = clear or looks[:1]
     whole = agreed([signatures(track, state.fit, () if growth.steps else growth.last) for track, state in clear])
@@ -595,7 +596,7 @@ def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shares: 
     if not growth.steps or whole.share > 1.0 - rest or rest > _HARDLY or simple:
         return whole, True
     track = clear[0][0]
-    left = signatures(track, refit(track, growth.end.fit.model, max_iterations=_FIRST_FIT).fit, growth.last)[0]
+    left = signatures(track, refit(track, growth.end.fit.model, max_iterations=FIRST_FIT).fit, growth.last)[0]
     return (left if left.share > _MOSTLY else whole), False
 
 

@@ -184,6 +184,8 @@ def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None])
     """
     best: tuple[float, Track, State, Screening] | None = None
     for track in tracks:
+        if track.unsure:
+            return None
         state = refit(track, nominal)
         found = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False)
         clear = tuple(each for each in found.tried if each.gain > _chance_of(track, state, (each,)))
@@ -269,7 +271,8 @@ def _added(
         else:
             found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
             last = found.tried
-            if state.excess < _TRIED * state.floor and not worth(state, found.tried, least):
+            least_worth = NOTHING if track.unsure else _TRIED
+            if state.excess < least_worth * state.floor and (track.unsure or not worth(state, found.tried, least)):
                 break
             rivals = [rival for rival in rivals_of(track, state, found, scales) if earns(state, rival.left, rival.offer, least)]
             if not rivals:

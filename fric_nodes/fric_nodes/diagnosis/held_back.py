@@ -54,7 +54,7 @@ def only_there(train: Sequence[Record], validation: Sequence[Record], held: Trac
     """
     if not _lacks(held, begin):
         return None
-    everything = Track.of((*train, *validation), held.bandwidth, begin)
+    everything = Track.of((*train, *validation), held.bandwidth, begin, held.late)
     state = refit(everything, begin)
     if not _lacks(held, state.fit.model):
         return None

@@ -173,6 +173,8 @@ def _shortest_range(quantity: Array, energy: Array) -> tuple[float, float, float
 def _words(name: str, low: float, high: float, scales: Scales, model: Model) -> str:
     x, f = model.units.position, model.units.force
     if name == "speed":
+        if high <= scales.slow:
+            return "at rest, or next to it"
         if low <= 2.0 * scales.slow:
             return f"|v| < {high:.3g} {x}/s"
         return f"|v| > {low:.3g} {x}/s" if high >= 0.98 * scales.speed else f"|v| from {low:.3g} to {high:.3g} {x}/s"

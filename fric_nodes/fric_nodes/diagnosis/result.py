@@ -26,6 +26,7 @@ __all__ = [
     "Unexplained",
     "Validation",
     "listed",
+    "percent",
 ]
 
 FORMAT = "fric-report/1"
@@ -212,7 +213,7 @@ class Diagnosis:
             elif first and helpful and first.share < _HARDLY_ANY:
                 left = f" Several effects explain it only together, each doing part of the others' work: {helpful}."
             elif first and helpful:
-                left = f" Of its energy {_percent(first.share)} % stay beside what helps: {helpful}."
+                left = f" Of its energy {percent(first.share)} % stay beside what helps: {helpful}."
             return f"Something is missing, and no known effect explains it; it sits here: {where}.{left}"
         named = (each for each in self.findings if each.effect != "unknown")
         names = listed([f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in named])
@@ -279,9 +280,10 @@ class Diagnosis:
         return found
 
 
-def _percent(share: float) -> str:
-    """A share in percent, two digits of it; all of it is 100 and not 1e+02."""
-    return f"{100.0 * share:.2g}" if share < 0.995 else "100"
+def percent(share: float, digits: int = 2) -> str:
+    """A share in percent, so many ``digits`` of it; all of it is 100 and not 1e+02."""
+    text = f"{100.0 * share:.{digits}g}"
+    return f"{100.0 * share:.0f}" if "e+" in text else text
 
 
 def listed(names: Sequence[str]) -> str:

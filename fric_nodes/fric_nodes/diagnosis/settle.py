@@ -16,7 +16,7 @@ from .track import Track, Twin
 from .twin import twins
 from .universe import worth_trying
 
-__all__ = ["CLEARLY", "FLOOR_KNOWN", "NEARLY_ALL", "Settled", "Step", "audit", "exchanged", "merged", "settled"]
+__all__ = ["CLEARLY", "FLOOR_KNOWN", "NEARLY_ALL", "Settled", "Step", "audit", "exchanged", "is_nothing", "merged", "settled"]
 
 _TO_STAY = 0.004  # of what is missing at the start, beside all other terms
 NEARLY_ALL = 0.9  # of what little is left: what takes that is an effect, and not what laws that differ in form leave,
@@ -223,7 +223,7 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
     return state, steps
 
 
-def _is_nothing(held: Term) -> bool:
+def is_nothing(held: Term) -> bool:
     """True for a term whose amplitudes are those of its absence."""
     neutral = held.effect.neutral
     names = [p.name for p in held.effect.parameters]
@@ -246,7 +246,7 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
             if len(terms) != len(state.fit.model.terms) - 1:
                 continue
             without = refit(track, without_term(state.fit.model, effect_id), max_iterations=8)
-            nothing = _is_nothing(next(each for each in state.fit.model.terms if each.effect.id == effect_id))
+            nothing = is_nothing(next(each for each in state.fit.model.terms if each.effect.id == effect_id))
             # What leaves an axis of another mass behind has only changed what stands in for what.
             dearer = implausible(track.mass, without.fit.model) - implausible(track.mass, state.fit.model)
             lost = without.left - state.left + begin.excess * max(dearer, 0.0)

@@ -51,6 +51,7 @@ _NEXT_TO_NOTHING = 1e-12  # [x/s], a speed that only has a sign
 _STEP_OF_RATE = 0.2
 _MOST_STEPS = 4  # per sample: the step is implicit, and what is faster than the observer changes nothing that it sees
 _STEP_OF_OBSERVER = 0.4  # of the observer's time constant: shorter ones it can't tell from this
+_UNSURE = 0.2  # of the variance of noise
 _SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
 _OVER = 0.3  # [s] after which it doesn't matter where in its gap a body began, how its spring was bent or a command had come
 _FORGOTTEN = 3.0  # [s] the same for what friction remembers, and for what rings on the body
@@ -176,6 +177,7 @@ class Track:
         lead: intervals at the beginning of each run that come before the part that counts, so that a model's states are those
             of the axis there.
         past: what came before each run, if it is a part of one: models that remember for longer are led along it.
+        late: part of a sample by which the force acts after its stamps, where its hold isn't known.
     """
 
     runs: tuple[Run, ...]
@@ -187,16 +189,17 @@ class Track:
     sizes: Mapping[str, float]
     lead: tuple[int, ...]
     past: tuple[Past | None, ...]
+    late: float = 0.0
 
     @classmethod
-    def of(cls, records: Sequence[Record], bandwidth: float, model: Model) -> Track:
+    def of(cls, records: Sequence[Record], bandwidth: float, model: Model, late: float = 0.0) -> Track:
         """Follow ``records`` with ``bandwidth`` [rad/s]; the inertia of ``model`` sets the scale."""
         runs: list[Run] = []
         time: list[Array] = []
         number: list[int] = []
         noise: list[float] = []
         for k, record in enumerate(records):
-            found = runs_of(record)
+            found = runs_of(record, late)
             bounds = np.flatnonzero(np.diff(np.concatenate([[False], record.mask, [False]]).astype(np.int8)))
             starts = [int(first) for first, last in zip(bounds[::2], bounds[1::2], strict=True) if last - first >= _SHORTEST]
             for run, first in zip(found, starts, strict=True):
@@ -215,6 +218,7 @@ class Track:
             _sizes(runs, mass),
             (0,) * len(runs),
             (None,) * len(runs),
+            late,
         )
 
     def parts(self, spans: Sequence[tuple[int, int, int]]) -> Track:
@@ -245,6 +249,16 @@ class Track:
     def travel(self) -> float:
         """From the lowest to the highest position of all runs [x]."""
         return max(float(np.ptp(np.concatenate([run.position for run in self.runs]))), 1e-300)
+
+    @cached_property
+    def unsure(self) -> bool:
+        """Whether more than the noise of its samples makes the force between them unsure.
+
+        What stands out then goes with the motion, as friction does: a form that noise can't have says nothing.
+        """
+        between = sum(float(np.sum(run.between**2)) for run in self.runs)
+        noise = sum(float(run.effort_noise**2 * run.effort.shape[0]) for run in self.runs)
+        return between > _UNSURE * noise
 
     @property
     def n_samples(self) -> int:

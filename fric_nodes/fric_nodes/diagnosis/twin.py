@@ -66,7 +66,7 @@ def twins(track: Track, model: Model, n_twins: int, seed: int = 1) -> list[Twin]
 def _noisy(runs: Sequence[Run], led: Sequence[tuple[Array, Array, Array]], random: np.random.Generator) -> Twin:
     efforts, positions = [], []
     for run, (there, _, given) in zip(runs, led, strict=True):
-        efforts.append(given + run.force_noise(random))
+        efforts.append(given + run.force_noise(random) + run.between * random.standard_normal(given.shape[0]))
         step = resolution(run.position)
         # What the steps of the encoder don't explain of the noise is the sensor's own.
         own = math.sqrt(max(noise_of(run.position) ** 2 - step**2 / 12.0, 0.0))

@@ -178,6 +178,8 @@ def _follower(model: Model, stretch: Stretch) -> _Follower:
         noise=noise_of(stretch.raw_position),
         effort_noise=noise_of(stretch.effort),
         hold=stretch.hold,
+        late=None,
+        between=np.zeros(n),
     )
     n_substeps = substeps(model, h)
     index = min(_INDICES, key=lambda trial: float(np.sum(innovations(model, [run], trial, n_substeps) ** 2)))

@@ -15,6 +15,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.special import comb
 
 from ..model import Model
 from ..record import Array, Record
@@ -26,6 +28,9 @@ __all__ = ["SETTLING", "Run", "excerpt", "gains", "innovations", "noise_of", "ru
 
 SETTLING = 20
 """Innovations dropped at the start of each run."""
+_DIFFERENCES = 6  # which no smooth force survives
+_AROUND = 9  # of them
+_CHANCE = 3.0  # times the variance of white noise, that so few of them seldom reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +47,10 @@ class Run:
         noise: of the position signal [x].
         effort_noise: of the recorded force at each sample [F]; that of an interval between two samples is another.
         hold: how the force over an interval comes from those at the samples, see :func:`fric_nodes.simulate.intervals`.
+        late: part of a sample by which a ``linear`` force acts after its stamps, on the curve through its samples; None: it is
+            taken as the line through them.
+        between: standard deviation of what may have acted between two samples beside what these say [F], shape ``(n,)``;
+            nothing where it is known how a force is held.
     """
 
     step: Array
@@ -53,6 +62,8 @@ class Run:
     noise: float
     effort_noise: float
     hold: str
+    late: float | None
+    between: Array
 
     @cached_property
     def sample_time(self) -> float:
@@ -76,19 +87,25 @@ class Run:
             start=begin,
             load=load,
             temperature=temperature,
+            between=self.between[first:last],
         )
 
     def force_noise(self, random: np.random.Generator) -> Array:
         """Noise as strong as that of the recorded force, over each interval [F], shape ``(n,)``."""
-        return intervals(self.effort_noise * random.standard_normal(self.effort.shape[0] + 1), self.hold)
+        return _over_intervals(self.effort_noise * random.standard_normal(self.effort.shape[0] + 1), self.hold, self.late)
 
     def moved(self, effort: Array, position: Array) -> Run:
         """The same with ``effort`` [F] and ``position`` [x] added to the signals, shape ``(n,)`` each."""
         return replace(self, effort=self.effort + effort, position=self.position + position)
 
 
-def runs_of(record: Record) -> list[Run]:
-    """The valid contiguous parts of ``record`` that are long enough to learn from."""
+def runs_of(record: Record, late: float | None = None) -> list[Run]:
+    """The valid contiguous parts of ``record`` that are long enough to learn from.
+
+    Args:
+        record: what was measured.
+        late: see :class:`Run`.
+    """
     load, temperature = surroundings(record)
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], record.mask, [False]]).astype(np.int8)))
     found = []
@@ -100,7 +117,7 @@ def runs_of(record: Record) -> list[Run]:
         found.append(
             Run(
                 step=step,
-                effort=np.ascontiguousarray(intervals(record.effort[first:last], record.effort_hold)),
+                effort=np.ascontiguousarray(_over_intervals(record.effort[first:last], record.effort_hold, late)),
                 position=np.ascontiguousarray(position[1:]),
                 start=(float(position[0]), float((position[1] - position[0]) / step[0])),
                 load=load[first : last - 1] if load.shape[0] > 1 else load,
@@ -108,9 +125,41 @@ def runs_of(record: Record) -> list[Run]:
                 noise=noise_of(position),
                 effort_noise=noise_of(record.effort[first:last]),
                 hold=record.effort_hold,
+                late=late,
+                between=_between(record.effort[first:last], record.effort_hold),
             )
         )
     return found
+
+
+def _over_intervals(effort: Array, hold: str, late: float | None) -> Array:
+    """The constant force of each interval between samples [F], shape ``(n_samples - 1,)``.
+
+    Where nobody says how a force is held and the log is slow, a line through its samples cuts off what a smooth curve has
+    between them: a twentieth of a force that swings with eight samples in a cycle.
+    """
+    if hold != "linear" or late is None:
+        return intervals(effort, hold)
+    samples = np.arange(effort.shape[0], dtype=np.float64)
+    passed = CubicSpline(samples, effort).antiderivative()(samples - late)
+    return np.asarray(np.diff(passed), dtype=np.float64)
+
+
+def _between(effort: Array, hold: str) -> Array:
+    """What may have acted between two samples beside what these say [F], shape ``(n_samples - 1,)``.
+
+    A controller faster than the log changes its force as roughly between samples as from one to the next. How roughly, high
+    differences tell, here and there: of a jump at any time within an interval the mean over it is unsure by 0.29 of the jump,
+    and these give 0.12 of it to each of the intervals around; of jitter that was another one at every step of the controller
+    the two samples around an interval say nothing.
+    """
+    if hold != "linear":
+        return np.zeros(effort.shape[0] - 1)
+    rough = np.diff(effort, _DIFFERENCES) ** 2 / float(comb(2 * _DIFFERENCES, _DIFFERENCES))
+    around = np.ones(_AROUND) / _AROUND
+    local = np.convolve(np.pad(rough, _DIFFERENCES // 2, mode="edge"), around, mode="same")
+    beyond = np.maximum(local - _CHANCE * noise_of(effort) ** 2, 0.0)
+    return np.sqrt(0.25 * (beyond[:-1] + beyond[1:]))
 
 
 def excerpt(runs: Sequence[Run], most: int) -> list[Run]:

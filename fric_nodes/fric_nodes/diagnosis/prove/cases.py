@@ -8,6 +8,9 @@ has not seen (:mod:`.reckoning`):
 - a *pair*: two effects, each of which is moderate when it is concealed alone on this axis and these recordings;
 - *mixed*: as a pair, of an effect and of physics outside the vocabulary, as real machines have both.
 
+In the variant *slow-log* a recording holds every second to eighth sample of the controller, and doesn't say that: what acted
+between two of them nobody knows. Weak effects, whose strength is one beside the noise alone, aren't asked for there.
+
 Everything follows from the seed: the same seed gives the same recordings.
 """
 
@@ -36,10 +39,13 @@ from .structure import nominal_model, relative_errors, true_model
 __all__ = ["KINDS", "VARIANTS", "Case", "Order", "draw", "plan"]
 
 KINDS = ("moderate", "weak", "pair", "unknown", "nothing", "mixed")
-VARIANTS = ("standard", "form", "half-rate", "double-rate", "mixed")
+VARIANTS = ("standard", "form", "half-rate", "double-rate", "mixed", "slow-log")
 
 _SHARES = {"moderate": 0.32, "weak": 0.16, "pair": 0.16, "unknown": 0.15, "nothing": 0.21}
 _MIXED_SHARES = {"mixed": 0.5, "unknown": 0.5}  # what is found beside something unknown: rightly, and wrongly
+_SLOW_LOG_SHARES = {"moderate": 0.42, "pair": 0.16, "unknown": 0.16, "nothing": 0.26}
+_EVERY = (2, 8)  # samples of the controller that a slow log holds one of
+_SLOWEST_LOG = 0.02  # [s]
 _RATE = {"half-rate": 0.5, "double-rate": 2.0}
 _MODERATE = (1.0, 15.0)
 _ATTEMPTS = 25
@@ -82,7 +88,7 @@ def plan(n_cases: int, seed: int, variant: str = "standard") -> list[Order]:
     if n_cases < 1:
         raise InputError("--cases", f"{n_cases} is too few", "ask for at least one case")
     random = np.random.default_rng([seed, VARIANTS.index(variant)])
-    counts = _counts(n_cases, _MIXED_SHARES if variant == "mixed" else _SHARES)
+    counts = _counts(n_cases, {"mixed": _MIXED_SHARES, "slow-log": _SLOW_LOG_SHARES}.get(variant, _SHARES))
     chosen: list[tuple[str, tuple[str, ...]]] = []
     for kind, count in counts.items():
         chosen += [(kind, names) for names in _names(kind, count, variant, random)]
@@ -269,7 +275,7 @@ def _finished(
     outside = next((name for name in order.names if name in OUTSIDE), None) if order.kind in ("unknown", "mixed") else None
     concealed = tuple(name for name in order.names if name != outside)
     components = sorted(OUTSIDE[outside].components) if outside else []
-    key = {
+    key: dict[str, Any] = {
         "format": "fric-prove-key/1",
         "number": order.number,
         "seed": order.seed,
@@ -292,8 +298,27 @@ def _finished(
         "force_noise": bench.force_noise,
         "true_structure": model_to_text(true_model(physics, bench.setting.parts, concealed, conditions)),
     }
-    train = tuple(_record(bench, physics, each, signals, conditions, "train") for each in bench.train)
-    return Case(train, (_record(bench, physics, bench.validation, signals, conditions, "validation"),), given, key)
+    train = [_record(bench, physics, each, signals, conditions, "train") for each in bench.train]
+    validation = [_record(bench, physics, bench.validation, signals, conditions, "validation")]
+    if order.variant == "slow-log":
+        most = min(_EVERY[1], int(_SLOWEST_LOG / bench.setting.sample_time))
+        every = int(random.integers(_EVERY[0], most + 1))
+        key["every"] = every
+        train, validation = ([_logged(each, every) for each in held] for held in (train, validation))
+    return Case(tuple(train), tuple(validation), given, key)
+
+
+def _logged(record: Record, every: int) -> Record:
+    """One of so many samples of ``record``, by a log that doesn't know how the force is held."""
+    extra = {name: signal[::every] for name, signal in record.extra.items()}
+    return replace(
+        record,
+        time=record.time[::every],
+        position=record.position[::every],
+        effort=record.effort[::every],
+        extra=extra,
+        effort_hold="linear",
+    )
 
 
 def _check(kind: str, noe: float, floor: float) -> None:

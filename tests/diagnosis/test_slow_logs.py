@@ -1,0 +1,75 @@
+"""Logs that don't say how a force is held, or hold only some of the controller's samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fric_nodes.diagnosis import diagnose
+from fric_nodes.diagnosis.prove import draw
+from fric_nodes.diagnosis.start import lateness
+from fric_nodes.identification.innovations import runs_of
+from fric_nodes.record import Array, Record
+
+pytestmark = pytest.mark.timeout(600)
+
+
+@pytest.mark.parametrize("late", [-0.5, -0.2, 0.0, 0.3, 0.5])
+def test_a_late_force_is_the_mean_of_the_curve_that_was_sampled(late: float) -> None:
+    step, rate = 0.004, 2.0 * np.pi / 0.032  # eight samples in a cycle
+    time = step * np.arange(400)
+    run = runs_of(_record(np.sin(rate * time), "linear"), late)[0]
+    begin = time[:-1] - late * step
+    true = (np.cos(rate * begin) - np.cos(rate * (begin + step))) / (rate * step)
+    np.testing.assert_allclose(run.effort[20:-20], true[20:-20], atol=2e-3)
+    # A line through the samples cuts off a twentieth.
+    line = 0.5 * np.sin(rate * time[1:]) + 0.5 * np.sin(rate * time[:-1])
+    assert float(np.std(line)) / float(np.std(true)) == pytest.approx(0.95, abs=0.005)
+
+
+def _record(effort: Array, hold: str) -> Record:
+    time = 0.004 * np.arange(effort.shape[0])
+    return Record(time, np.sin(time), effort, effort_hold=hold)
+
+
+def test_white_noise_leaves_nothing_unsure_between_samples_and_a_jump_does_where_it_is() -> None:
+    random = np.random.default_rng(2)
+    noise: Array = 0.1 * random.standard_normal(4000)
+    plain = runs_of(_record(noise, "linear"))[0]
+    assert float(np.mean(plain.between**2)) < 0.1 * plain.effort_noise**2
+    jump = noise + np.where(np.arange(4000) > 2000, 5.0, 0.0)
+    stepped = runs_of(_record(jump, "linear"))[0]
+    # Over the interval in which it jumps by 5 the mean force is unsure by 5/sqrt(12): as much, in all, as the intervals around.
+    assert np.sqrt(np.sum(stepped.between[1980:2020] ** 2)) == pytest.approx(5.0 / np.sqrt(12.0), rel=0.5)
+    assert float(np.max(stepped.between[:1980])) == pytest.approx(float(np.max(plain.between[:1980])), rel=0.05)
+    assert not np.any(runs_of(_record(jump, "following"))[0].between)
+
+
+def test_a_force_held_from_its_stamp_comes_half_a_sample_late_where_nobody_says_so() -> None:
+    case = draw(4, "nothing")
+    record = case.train[0]
+    assert lateness([record], case.nominal) == 0.0
+    untold = replace(record, effort_hold="linear")
+    assert lateness([untold], case.nominal) == pytest.approx(0.5, abs=0.05)
+    # A shift by a whole sample is no matter of how a force is held.
+    shifted = replace(untold, effort=np.concatenate([untold.effort[1:], untold.effort[-1:]]))
+    assert lateness([shifted], case.nominal) == 0.0
+    earlier = [replace(each, effort_hold="linear") for each in (*case.train, *case.validation)]
+    found = diagnose(earlier[:1], earlier[1:], case.nominal)
+    assert not found.mismatch
+    assert any("half a sample late" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_log_slower_than_the_controller_lacks_nothing(seed: int) -> None:
+    case = draw(seed, "nothing", variant="slow-log")
+    assert case.train[0].effort_hold == "linear"
+    assert case.train[0].sample_time == pytest.approx(case.key["every"] * case.key["sample_time"])
+    assert not diagnose(case.train, case.validation, case.nominal).findings
+
+
+def test_in_a_slow_log_what_is_missing_is_still_named() -> None:
+    case = draw(1, "moderate", "position_dependence", "slow-log")
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert [each.effect for each in found.findings][:1] == ["position_dependence"]
