@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fric_nodes.diagnosis import diagnose
 from fric_nodes.diagnosis.prove import draw
-from fric_nodes.diagnosis.start import lateness
+from fric_nodes.diagnosis.start import evenly_stamped, lateness, with_even_stamps
 from fric_nodes.identification.innovations import runs_of
 from fric_nodes.record import Array, Record
 
@@ -73,3 +73,41 @@ def test_in_a_slow_log_what_is_missing_is_still_named() -> None:
     case = draw(1, "moderate", "position_dependence", "slow-log")
     found = diagnose(case.train, case.validation, case.nominal)
     assert [each.effect for each in found.findings][:1] == ["position_dependence"]
+
+
+def _jittering(record: Record, part: float, seed: int) -> Record:
+    off = part * np.random.default_rng(seed).standard_normal(record.n_samples)
+    time = record.time + record.sample_time * np.clip(off, -0.45, 0.45)
+    return replace(record, time=time - time[0])
+
+
+def test_stamps_that_jitter_where_the_motion_does_not_are_taken_as_even() -> None:
+    case = draw(4, "nothing")
+    train, validation = ([_jittering(each, 0.2, 3) for each in held] for held in (case.train, case.validation))
+    found = diagnose(train, validation, case.nominal)
+    assert not found.mismatch
+    assert any("jitter by" in note and "taken as even" in note for note in found.notes)
+
+
+def test_uneven_stamps_of_an_uneven_log_are_left_as_they_are() -> None:
+    case = draw(4, "nothing")
+    apart = np.cumsum(np.random.default_rng(5).integers(2, 5, case.train[0].n_samples))
+    logs = []
+    for record in (*case.train, *case.validation):
+        kept = apart[apart < record.n_samples]
+        time = record.time[kept] - record.time[kept[0]]
+        logs.append(
+            replace(record, time=time, position=record.position[kept], effort=record.effort[kept], effort_hold="linear")
+        )
+    even = evenly_stamped(logs[:1], logs[1:], case.nominal)
+    assert even[0][0] is logs[0]
+    assert even[2] == []
+    assert not diagnose(logs[:1], logs[1:], case.nominal).findings
+
+
+def test_even_stamps_are_found_beside_gaps() -> None:
+    record = _jittering(draw(4, "nothing").train[0], 0.05, 3)
+    kept = np.concatenate([np.arange(700), np.arange(900, 1500), np.arange(1503, 4000)])
+    holed = replace(record, time=record.time[kept], position=record.position[kept], effort=record.effort[kept])
+    even = with_even_stamps(holed)
+    assert float(np.max(np.abs(even.time - record.sample_time * kept))) < 0.2 * record.sample_time

@@ -54,6 +54,7 @@ from .start import (
     FAST,
     FIRST_FIT,
     DiagnosisError,
+    evenly_stamped,
     held_as,
     lateness,
     refuse_other_plant,
@@ -131,6 +132,8 @@ def diagnose(
     conditions = nominal_conditions(train) | dict(nominal.nominal)
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
+    train, validation, evened = evenly_stamped(train, validation, nominal)
+    corrected += evened
     tracks, start = started(nominal, train)
     refuse_other_plant(train, tracks[0], start)
     corrected += held_as(tracks[0])

@@ -27,12 +27,14 @@ __all__ = [
     "FAST",
     "FIRST_FIT",
     "DiagnosisError",
+    "evenly_stamped",
     "held_as",
     "lateness",
     "refuse_other_plant",
     "spread_of",
     "started",
     "tracks_of",
+    "with_even_stamps",
 ]
 
 BANDWIDTHS = (45.0, 140.0, 400.0)
@@ -45,6 +47,8 @@ _LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of
 _EXPLAINED = 0.02  # of the force: a plant that leaves less of it may be the one recorded
 _FAR_BETTER = 0.25  # of what the given plant leaves: where a mass with the same terms leaves less, it is another plant
 _HELD_LATE = 0.1  # of a sample: less isn't worth a word
+_JITTERS = 0.02  # of a sample: stamps that are evener are left as they are
+_MUCH_BETTER = 0.7  # of what the stamps as they are leave
 _HELD = 0.65  # of a sample: a force that acts later than that, or earlier, does so for another reason
 
 
@@ -72,6 +76,54 @@ def started(nominal: Model, train: Sequence[Record], as_given: bool = False) -> 
         # Where so much is missing that it makes up a mass of its own, the one given is the better measure.
         tracks = [replace(track, mass=nominal.total_inertia) for track in tracks]
     return tracks, best.model
+
+
+def evenly_stamped(
+    train: Sequence[Record], validation: Sequence[Record], nominal: Model
+) -> tuple[Sequence[Record], Sequence[Record], list[str]]:
+    """The recordings with even stamps, where theirs jitter and the model fits far better without that, and a note of it.
+
+    A driver that samples by a clock and stamps what it has read when it comes around to it stamps unevenly what is even; one
+    that samples when it comes around to it stamps as it should. Only the motion tells which.
+    """
+    evened = [with_even_stamps(record) for record in train]
+    jitter = max(
+        float(np.std(each.time - record.time)) / record.sample_time for each, record in zip(evened, train, strict=True)
+    )
+    if nominal.plant.led or jitter < _JITTERS:
+        return train, validation, []
+    lacks = []
+    for held in (train, evened):
+        model = _by_inverse_dynamics(nominal, held) or nominal
+        track = tracks_of(held, model)[-1]
+        residual = track.fit(model, free_names(model), FIRST_FIT, bounds_of(model, scales_of(track))).residual
+        lacks.append(float(residual @ residual))
+    if lacks[1] > _MUCH_BETTER * lacks[0]:
+        return train, validation, []
+    note = (
+        f"stamps jitter by {100.0 * jitter:.2g} % of a sample, and the motion does not: taken as even, which leaves "
+        f"{lacks[0] / max(lacks[1], 1e-300):.2g} times less unexplained; stamp where the sensor is read"
+    )
+    return evened, [with_even_stamps(record) for record in validation], [note]
+
+
+def with_even_stamps(record: Record) -> Record:
+    """``record`` with stamps a whole number of samples apart, but across gaps."""
+    every = np.arange(record.n_samples, dtype=np.float64)
+    line = np.polyval(np.polyfit(every, record.time, 1), every)
+    if float(np.max(np.abs(record.time - line))) < record.sample_time:  # none is missing
+        return replace(record, time=line - line[0])
+    step = np.diff(record.time)
+    apart = np.maximum(np.round(step / record.sample_time), 1.0)
+    number = np.concatenate([[0.0], np.cumsum(apart)])
+    pieces = np.split(np.arange(number.shape[0]), np.flatnonzero(apart > 1.0) + 1)
+    longest = max(pieces, key=len)
+    period = float(np.polyfit(number[longest], record.time[longest], 1)[0])
+    time = np.empty_like(record.time)
+    for piece in pieces:
+        time[piece] = period * number[piece] + float(np.mean(record.time[piece] - period * number[piece]))
+    time -= time[0]
+    return replace(record, time=time) if np.all(np.diff(time) > 0.0) else record
 
 
 def _by_inverse_dynamics(model: Model, train: Sequence[Record]) -> Model | None:

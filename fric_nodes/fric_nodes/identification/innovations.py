@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import make_interp_spline
 from scipy.special import comb
 
 from ..model import Model
@@ -30,6 +30,7 @@ SETTLING = 20
 """Innovations dropped at the start of each run."""
 _DIFFERENCES = 6  # which no smooth force survives
 _AROUND = 9  # of them
+_APART = 0.5  # of the usual step: samples that are no closer
 _CHANCE = 3.0  # times the variance of white noise, that so few of them seldom reach
 
 
@@ -92,7 +93,8 @@ class Run:
 
     def force_noise(self, random: np.random.Generator) -> Array:
         """Noise as strong as that of the recorded force, over each interval [F], shape ``(n,)``."""
-        return _over_intervals(self.effort_noise * random.standard_normal(self.effort.shape[0] + 1), self.hold, self.late)
+        white = self.effort_noise * random.standard_normal(self.effort.shape[0] + 1)
+        return _over_intervals(white, self.step, self.hold, self.late)
 
     def moved(self, effort: Array, position: Array) -> Run:
         """The same with ``effort`` [F] and ``position`` [x] added to the signals, shape ``(n,)`` each."""
@@ -117,7 +119,7 @@ def runs_of(record: Record, late: float | None = None) -> list[Run]:
         found.append(
             Run(
                 step=step,
-                effort=np.ascontiguousarray(_over_intervals(record.effort[first:last], record.effort_hold, late)),
+                effort=np.ascontiguousarray(_over_intervals(record.effort[first:last], step, record.effort_hold, late)),
                 position=np.ascontiguousarray(position[1:]),
                 start=(float(position[0]), float((position[1] - position[0]) / step[0])),
                 load=load[first : last - 1] if load.shape[0] > 1 else load,
@@ -132,17 +134,20 @@ def runs_of(record: Record, late: float | None = None) -> list[Run]:
     return found
 
 
-def _over_intervals(effort: Array, hold: str, late: float | None) -> Array:
-    """The constant force of each interval between samples [F], shape ``(n_samples - 1,)``.
+def _over_intervals(effort: Array, step: Array, hold: str, late: float | None) -> Array:
+    """The constant force of each interval between samples [F], shape ``(n_samples - 1,)`` as ``step`` [s].
 
     Where nobody says how a force is held and the log is slow, a line through its samples cuts off what a smooth curve has
     between them: a twentieth of a force that swings with eight samples in a cycle.
     """
     if hold != "linear" or late is None:
         return intervals(effort, hold)
-    samples = np.arange(effort.shape[0], dtype=np.float64)
-    passed = CubicSpline(samples, effort).antiderivative()(samples - late)
-    return np.asarray(np.diff(passed), dtype=np.float64)
+    time = np.concatenate([[0.0], np.cumsum(step)])
+    usual = float(np.median(step))
+    # A cubic through samples next to each other would make much of the noise in them.
+    degree = 3 if float(np.min(step)) > _APART * usual else 1
+    passed = make_interp_spline(time, effort, degree).antiderivative()(time - late * usual)
+    return np.asarray(np.diff(passed) / step, dtype=np.float64)
 
 
 def _between(effort: Array, hold: str) -> Array:
