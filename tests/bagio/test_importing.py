@@ -325,3 +325,13 @@ def test_empty_cells_are_found(tmp_path: Path) -> None:
     file.write_text("\n".join(lines))
     with pytest.raises(BagError, match="position is not finite"):
         import_recording(file, MAP)
+
+
+def test_what_a_table_has_not_is_not_advised(tmp_path: Path) -> None:
+    lines = table(tmp_path / "run.csv").read_text().splitlines()
+    lines[20] = lines[19]
+    (tmp_path / "run.csv").write_text("\n".join(lines))
+    with pytest.raises(BagError, match="repeat an earlier one") as refused:
+        import_recording(tmp_path / "run.csv", load_mapping(MAP))
+    assert "--repair" in str(refused.value)
+    assert "--time log" not in str(refused.value)

@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fric_nodes.diagnosis import Diagnosis, DiagnosisError, diagnose
-from fric_nodes.diagnosis.fitting import refit
+from fric_nodes.diagnosis.fitting import State, refit
+from fric_nodes.diagnosis.grow import Growth, without_nothings
 from fric_nodes.diagnosis.held_back import only_there
 from fric_nodes.diagnosis.prove import draw
+from fric_nodes.diagnosis.settle import Step
 from fric_nodes.diagnosis.track import Track
 from fric_nodes.model import build_model, term
 from fric_nodes.model_file import model_from_text, model_to_text
@@ -281,3 +283,17 @@ def test_a_model_of_another_plant_is_refused_unless_it_holds_the_right_one() -> 
     found = diagnose(case.train, case.validation, build_model("pendulum", {"inertia": 1.0, "gravity": 10.0}, terms))
     assert not found.mismatch
     assert found.model.value("inertia") == pytest.approx(case.key["physics"]["mass"], rel=0.02)
+
+
+def test_a_term_that_comes_out_at_nothing_is_not_told_of(presliding: tuple[object, Diagnosis]) -> None:
+    _, found = presliding
+    nothing = replace(found.model, terms=(*found.model.terms, term("bias", force=0.0)), standard_errors={})
+    steps = tuple(Step(name, 1.0, 0.1, 0.01, 0.9, (), ()) for name in ("bias", "presliding"))
+    track = Track.of([draw(0, "moderate", "presliding").train[0]], 100.0, nothing)
+    state = State(track.fit(nothing, ("bias.force",), 1), 0.1, 0.01, ())
+    growth = Growth(track, state, state, steps, (), 1.0)
+    left, end = without_nothings(growth, nothing)
+    assert [step.term for step in left.steps] == ["presliding"]
+    assert "bias" not in {held.effect.id for held in end.terms}
+    assert left.rejected[0][0] == "bias"
+    assert "at nothing" in left.rejected[0][1]

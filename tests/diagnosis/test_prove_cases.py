@@ -131,4 +131,4 @@ def test_refusals() -> None:
         plan(10, 1, "odd")
     with pytest.raises(InputError, match="cases"):
         plan(0, 1)
-    assert set(VARIANTS) == {"standard", "form", "half-rate", "double-rate", "mixed"}
+    assert set(VARIANTS) == {"standard", "form", "half-rate", "double-rate", "mixed", "slow-log"}

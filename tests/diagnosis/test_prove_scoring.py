@@ -127,6 +127,19 @@ def test_variants_have_goals_five_points_wider_for_shares_and_the_same_for_all_e
     }
 
 
+def test_in_a_slow_log_only_what_is_said_wrongly_has_a_goal() -> None:
+    outcomes = [
+        _outcome("moderate", ("ripple",), (_found("ripple"),)),
+        _outcome("pair", ("ripple", "bias"), (_found("ripple"),)),
+        _outcome("nothing", (), ()),
+    ]
+    goals = {each.name: each.goal for each in scored(outcomes, "slow-log").figures}
+    assert goals["single effects of moderate strength, named first"] == goals["pairs, both named"] == ""
+    assert goals["NOE on unseen data over the true structure's own, median"] == ""
+    assert goals["nothing missing, but something found (false alarms)"] == "<= 0.07"
+    assert goals["expected calibration error of the confidence"] == "<= 0.1"
+
+
 def test_components_come_from_the_registry() -> None:
     assert components_of("delay") == {"command path"}
     assert components_of("stribeck") == {"guideway friction"}

@@ -129,16 +129,23 @@ def gap_length_ns(time_ns: Stamps) -> float:
     return max(_GAP_MEDIANS * float(np.median(step)), _GAP_FLOOR_NS) if step.size else _GAP_FLOOR_NS
 
 
-def check_samples(where: object, samples: Samples, *, repair: bool) -> None:
+def check_samples(where: object, samples: Samples, *, repair: bool, received: bool = True) -> None:
     """Check samples, or repair them in place.
+
+    Args:
+        where: they come from.
+        samples: to be checked.
+        repair: what can be.
+        received: True when they have a time of reception besides, as those of a bag have.
 
     Raises:
         BagError: too short; or, without ``repair``, values that are not finite, stamps that go back, repeat or jump, gaps.
     """
     _enough(where, samples)
     _finite(where, samples, repair)
-    _jumps(where, samples, repair)
-    _order(where, samples, repair)
+    otherwise = ", or read by time of reception with --time log" if received else ""
+    _jumps(where, samples, repair, otherwise)
+    _order(where, samples, repair, otherwise)
     _gaps(where, samples, repair)
     _enough(where, samples)
 
@@ -168,7 +175,7 @@ def _finite(where: object, samples: Samples, repair: bool) -> None:
         _enough(where, samples)
 
 
-def _jumps(where: object, samples: Samples, repair: bool) -> None:
+def _jumps(where: object, samples: Samples, repair: bool, otherwise: str) -> None:
     step = np.diff(samples.time_ns)
     far = (step > _JUMP_NS) | (step < -gap_length_ns(samples.time_ns))
     if not far.any():
@@ -177,8 +184,7 @@ def _jumps(where: object, samples: Samples, repair: bool) -> None:
     size = float(step[at]) * 1e-9
     what = f"time jumps by {size:+.3f} s after sample {at} (at {samples.seconds(at):.3f} s), {int(far.sum())} jump(s) in all"
     if not repair:
-        remedy = "keep the longest part in one piece with --repair, or read by time of reception with --time log"
-        raise BagError(where, what, remedy)
+        raise BagError(where, what, f"keep the longest part in one piece with --repair{otherwise}")
     edges = [0, *(np.flatnonzero(far) + 1).tolist(), samples.time_ns.size]
     chosen, left_out = _longest_part(samples.time_ns, edges)
     samples.keep(chosen)
@@ -206,7 +212,7 @@ def _longest_part(time_ns: Stamps, edges: list[int]) -> tuple[Mask, int]:
     return chosen, int(time_ns.size - chosen.sum())
 
 
-def _order(where: object, samples: Samples, repair: bool) -> None:
+def _order(where: object, samples: Samples, repair: bool, otherwise: str) -> None:
     time_ns = samples.time_ns
     newest = np.maximum.accumulate(time_ns)
     back = np.zeros(time_ns.size, dtype=np.bool_)
@@ -219,7 +225,7 @@ def _order(where: object, samples: Samples, repair: bool) -> None:
         first = int(np.argmax(bad))
         what = f"{int(bad.sum())} of {time_ns.size} stamps {verb}, first at sample {first} ({samples.seconds(first):.3f} s)"
         if not repair:
-            raise BagError(where, what, "drop these samples with --repair, or read by time of reception with --time log")
+            raise BagError(where, what, f"drop these samples with --repair{otherwise}")
         samples.notes.append(f"{what}: dropped")
     samples.keep(~(back | again))
 

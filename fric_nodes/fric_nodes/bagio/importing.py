@@ -104,7 +104,7 @@ class _Import:
         time, signals = self._finite_time(time, signals, repair)
         time_ns = np.rint((time - (time[0] if time.size else 0.0)) * 1e9).astype(np.int64)
         samples = Samples(time_ns, signals, np.ones(time.size, dtype=np.bool_), self.notes)
-        check_samples(self.path, samples, repair=repair)
+        check_samples(self.path, samples, repair=repair, received=False)
         kept = samples.signals
         seconds = (samples.time_ns - samples.time_ns[0]) * 1e-9
         if "position" not in kept:

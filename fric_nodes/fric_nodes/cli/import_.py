@@ -34,7 +34,12 @@ def import_(
     repair: RepairOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Turn a recording into a rosbag2 that every other verb reads."""
+    """Turn a recording into a rosbag2 that every other verb reads.
+
+    The mapping names time, effort, and position or velocity; reference, normal_load, temperature and extra signals may follow.
+    Its effort_hold says when a force acts: following (a controller's output, held from its stamp to the next), preceding, or
+    linear (measured, or nothing is known; the default).
+    """
     from ..bagio.importing import import_recording
     from ..bagio.mapping import load_mapping
     from ..bagio.write import write_record

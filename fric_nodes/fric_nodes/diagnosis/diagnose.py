@@ -29,7 +29,7 @@ from .component import Signature, agreed, signatures
 from .confidence import AS_LIKELY, UNEXPLAINED, confidence_of, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, refit
-from .grow import Growth, grow, helped
+from .grow import Growth, grow, helped, without_nothings
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
 from .locate import Where, locate, moved_back, steady
@@ -48,7 +48,7 @@ from .result import (
 )
 from .rivals import FAR_OFF, implausible, mass_off
 from .screen import Tried
-from .settle import FLOOR_KNOWN, Step, is_nothing
+from .settle import FLOOR_KNOWN, Step
 from .start import (
     BANDWIDTHS,
     FAST,
@@ -231,7 +231,7 @@ def _concluded(
     held = _shown(validation, growth.track, growth.begin.fit.model, growth.beyond > 0.0)
     track, begin_fit, end_fit = _as_fast(whole, held, growth)
     begin, end = begin_fit.model, _with_errors(track, end_fit)
-    growth, end = _without_nothings(growth, end)
+    growth, end = without_nothings(growth, end)
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin), "augmented": held.residual(end)}
     spread = spread_of(held)
     floor = _floor(held, begin, end, left["refit"])
@@ -406,17 +406,6 @@ def _as_fast(whole: Sequence[Track], held: Track, growth: Growth) -> tuple[Track
     bounds = [bounds_of(fit.model, scales_of(track)) for fit in fits]
     begin, end = (track.fit(fit.model, fit.names, _AS_FAST, among) for fit, among in zip(fits, bounds, strict=True))
     return track, begin, end if growth.steps else begin
-
-
-def _without_nothings(growth: Growth, end: Model) -> tuple[Growth, Model]:
-    """Both without the terms that come out at nothing when they are fitted to what the faster observer sees."""
-    gone = {held.effect.id for held in end.terms if is_nothing(held)} & {step.term for step in growth.steps}
-    if not gone:
-        return growth, end
-    why = tuple((name, "comes out at nothing when it is fitted to all that a fast observer sees") for name in sorted(gone))
-    left = end.with_terms(held for held in end.terms if held.effect.id not in gone)
-    kept = tuple(step for step in growth.steps if step.term not in gone)
-    return replace(growth, steps=kept, rejected=(*growth.rejected, *why)), left
 
 
 def _floor(held: Track, begin: Model, end: Model, lacking: Array) -> list[Array]:

@@ -18,10 +18,10 @@ from .fitting import NOTHING, State, best_track, refit
 from .laws import with_best_laws
 from .rivals import BY_CHANCE, OF_EXCESS, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
 from .screen import Screening, Tried, screen
-from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, audit, exchanged, merged, settled
+from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, audit, exchanged, is_nothing, merged, settled
 from .track import Track
 
-__all__ = ["Growth", "grow", "helped"]
+__all__ = ["Growth", "grow", "helped", "without_nothings"]
 
 _TO_COMPARE = 2  # terms, after which another beginning is tried
 _OTHER_BEGINNINGS = 2
@@ -135,6 +135,17 @@ def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None])
         return growth
     gone = (*growth.rejected, *done.gone)
     return replace(raw, begin=done.begin, end=done.state, steps=done.steps, rest=done.rest, rejected=gone, unhelped=growth)
+
+
+def without_nothings(growth: Growth, end: Model) -> tuple[Growth, Model]:
+    """Both without the terms that come out at nothing when they are fitted to what the faster observer sees."""
+    gone = {held.effect.id for held in end.terms if is_nothing(held)} & {step.term for step in growth.steps}
+    if not gone:
+        return growth, end
+    why = tuple((name, "comes out at nothing when it is fitted to all that a fast observer sees") for name in sorted(gone))
+    left = end.with_terms(held for held in end.terms if held.effect.id not in gone)
+    kept = tuple(step for step in growth.steps if step.term not in gone)
+    return replace(growth, steps=kept, rejected=(*growth.rejected, *why)), left
 
 
 def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth:
