@@ -297,3 +297,15 @@ def test_a_term_that_comes_out_at_nothing_is_not_told_of(presliding: tuple[objec
     assert "bias" not in {held.effect.id for held in end.terms}
     assert left.rejected[0][0] == "bias"
     assert "at nothing" in left.rejected[0][1]
+
+
+@pytest.mark.parametrize("where", ["train", "validation", "both"])
+def test_a_wrong_sign_is_taken_out_of_the_recordings_that_have_it(where: str) -> None:
+    case = draw(3, "nothing")
+    turned = [replace(each, effort=-each.effort) for each in (*case.train, *case.validation)]
+    train = turned[:1] if where != "validation" else list(case.train)
+    validation = turned[1:] if where != "train" else list(case.validation)
+    found = diagnose(train, validation, case.nominal)
+    assert not found.mismatch
+    assert found.model.value("mass") == pytest.approx(case.key["physics"]["mass"], rel=0.02)
+    assert found.validation.noe_refit < 0.2

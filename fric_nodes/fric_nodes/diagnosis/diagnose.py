@@ -18,8 +18,8 @@ from ..effect import Effect
 from ..effects import EFFECTS
 from ..identification.equations import nominal_conditions
 from ..identification.statistics import sandwich_covariance
+from ..instrument import Correction, inspect
 from ..instrument import Finding as Check
-from ..instrument import inspect
 from ..model import Model
 from ..record import Array, Record
 from ..threads import linear_algebra_in_one
@@ -116,7 +116,7 @@ def diagnose(
     _refuse(train, validation)
     tell("checking the instrument")
     checks = inspect(train, nominal)
-    train, validation, corrected = _corrected(train, validation, checks)
+    train, validation, corrected = _corrected(train, validation, nominal, checks)
     if nominal.joint not in (_ANY_JOINT, train[0].joint):
         corrected.append(
             f"the model is of the joint '{nominal.joint}', the recordings of '{train[0].joint}': taken for the same"
@@ -197,24 +197,43 @@ def _holds_inertia(found: Diagnosis, nominal: Model) -> bool:
 
 
 def _corrected(
-    train: Sequence[Record], validation: Sequence[Record], checks: Sequence[Check]
+    train: Sequence[Record], validation: Sequence[Record], nominal: Model, checks: Sequence[Check]
 ) -> tuple[list[Record], list[Record], list[str]]:
-    """The recordings without the faults of sign, unit and clock that can be taken out of all of them alike.
+    """The recordings without the faults of sign, unit and clock that can be taken out of them.
 
-    A delay is left in: it may belong to the axis, and is a candidate like others.
+    What all recordings learnt from have is taken out of those held back alike, unless these are seen not to have it; what these
+    alone have is taken out of them. A delay is left in: it may belong to the axis, and is a candidate like others.
     """
-    notes = []
-    held, kept_apart = list(train), list(validation)
-    for check in checks:
-        if check.verdict != "fault" or check.correction is None or check.correction.effort_shift != 0.0:
-            continue
-        if check.recording is None or len(held) == 1:
-            held = [check.correction.apply(record) for record in held]
-            kept_apart = [check.correction.apply(record) for record in kept_apart]
-        else:
-            held[check.recording] = check.correction.apply(held[check.recording])
-        notes.append(f"corrected before anything was fitted: {check.correction.text} ({check.detail})")
+    held, kept_apart, notes = list(train), list(validation), []
+    wrong = [(check, correction) for check in checks if (correction := _correction_of(check)) is not None]
+    for check, correction in wrong:
+        for k in range(len(held)) if check.recording is None else [check.recording]:
+            held[k] = correction.apply(held[k])
+        notes.append(f"corrected before anything was fitted: {correction.text} ({check.detail})")
+    of_all: dict[str, Correction] = {}
+    for check, correction in wrong:
+        if check.recording is None or sum(each.check == check.check for each, _ in wrong) == len(held):
+            of_all.setdefault(check.check, correction)
+    for k, record in enumerate(validation):
+        seen = inspect([record], nominal)
+        right = {check.check for check in seen if check.verdict == "ok"}
+        for name, correction in of_all.items():
+            if name in right:
+                notes.append(f"{record.source} is right as it is: not corrected by {correction.text}")
+            else:
+                kept_apart[k] = correction.apply(kept_apart[k])
+        for check in seen:
+            own = _correction_of(check)
+            if own is not None and check.check not in of_all:
+                kept_apart[k] = own.apply(kept_apart[k])
+                notes.append(f"corrected in {record.source} alone: {own.text} ({check.detail})")
     return held, kept_apart, notes
+
+
+def _correction_of(check: Check) -> Correction | None:
+    """What takes the fault out that ``check`` has found, or None."""
+    delayed = check.correction is None or check.correction.effort_shift != 0.0
+    return None if delayed or check.verdict != "fault" else check.correction
 
 
 def _concluded(
