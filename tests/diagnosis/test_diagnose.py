@@ -309,3 +309,19 @@ def test_a_wrong_sign_is_taken_out_of_the_recordings_that_have_it(where: str) ->
     assert not found.mismatch
     assert found.model.value("mass") == pytest.approx(case.key["physics"]["mass"], rel=0.02)
     assert found.validation.noe_refit < 0.2
+
+
+def test_a_recording_of_rest_is_told_from_motion_beside_its_noise() -> None:
+    case = draw(3, "nothing")
+    record = case.train[0]
+    random = np.random.default_rng(1)
+    noisy = 1e-7 * random.standard_normal(record.n_samples)
+    flickering = np.where(random.random(record.n_samples) > 0.9, 1e-6, 0.0)
+    for position in (noisy, flickering):
+        still = replace(record, position=position, source="still.mcap")
+        with pytest.raises(DiagnosisError, match=r"still.mcap.*nothing but rest"):
+            diagnose([still], case.validation, case.nominal)
+        # Beside another recording it is left out, and that is said.
+        found = diagnose([record, still], case.validation, case.nominal)
+        assert not found.mismatch
+        assert "still.mcap holds nothing but rest: left out" in found.notes

@@ -17,7 +17,7 @@ import numpy as np
 from ..effect import Effect
 from ..effects import EFFECTS
 from ..identification.equations import nominal_conditions
-from ..identification.statistics import sandwich_covariance
+from ..identification.statistics import noise_of, sandwich_covariance
 from ..instrument import Correction, inspect
 from ..instrument import Finding as Check
 from ..model import Model
@@ -88,6 +88,8 @@ _LOCATING = 600.0  # [rad/s], for spans of time
 _NEGLIGIBLE = 1e-4  # NOE [%]: a force within a thousandth is what steps of any simulation and sampling differ by
 _ANY_JOINT = "axis"  # of a model that says nothing of it
 _UNDECIDED = 0.45  # confidence at most, where no parameter of an effect is as large as its own standard error
+_STILL = 12.0  # times the noise of a position, that hardly any sample of an hour is off by to either side
+_FLICKERS = 3  # values
 _LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that moves the body
 
 
@@ -114,9 +116,11 @@ def diagnose(
     """
     tell = progress or (lambda _: None)
     _refuse(train, validation)
+    (train, left_out), (validation, left_out_too) = _of_use(train), _of_use(validation)
     tell("checking the instrument")
     checks = inspect(train, nominal)
     train, validation, corrected = _corrected(train, validation, nominal, checks)
+    corrected = [*left_out, *left_out_too, *corrected]
     if nominal.joint not in (_ANY_JOINT, train[0].joint):
         corrected.append(
             f"the model is of the joint '{nominal.joint}', the recordings of '{train[0].joint}': taken for the same"
@@ -180,11 +184,34 @@ def _refuse(train: Sequence[Record], validation: Sequence[Record]) -> None:
                 raise DiagnosisError(
                     held.source, "is the recording that is learnt from, too", "hold another recording back for --validate"
                 )
-    for record in (*train, *validation):
-        if float(np.ptp(record.position)) == 0.0:
-            raise DiagnosisError(record.source, "holds nothing but rest", "record the axis in motion")
-        if float(np.ptp(record.effort)) == 0.0:
-            raise DiagnosisError(record.source, "has no force signal: it never changes", "record the effort, or give --topic")
+
+
+def _of_use(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Those of ``records`` in which a force moves the axis, and a note for each that is left out.
+
+    Raises:
+        DiagnosisError: there is none.
+    """
+    held, notes = [], []
+    refusal: DiagnosisError | None = None
+    for record in records:
+        if _rests(record.position):
+            problem, remedy = "holds nothing but rest", "record the axis in motion"
+        elif float(np.ptp(record.effort)) == 0.0:
+            problem, remedy = "has no force signal: it never changes", "record the effort, or give --topic"
+        else:
+            held.append(record)
+            continue
+        refusal = refusal or DiagnosisError(record.source, problem, remedy)
+        notes.append(f"{record.source} {problem}: left out")
+    if not held and refusal is not None:
+        raise refusal
+    return held, notes
+
+
+def _rests(position: Array) -> bool:
+    """True where a position shows nothing but its noise, or flickers between neighbouring steps of its encoder."""
+    return float(np.ptp(position)) <= _STILL * noise_of(position) or np.unique(position).size <= _FLICKERS
 
 
 def _holds_inertia(found: Diagnosis, nominal: Model) -> bool:
