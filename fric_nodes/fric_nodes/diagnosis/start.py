@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..effect import Place
 from ..errors import InputError
 from ..identification import METHODS
 from ..identification.result import IdentificationError, Options
@@ -143,6 +144,9 @@ def lateness(train: Sequence[Record], start: Model) -> float:
     """
     if start.plant.led or any(record.effort_hold != "linear" for record in train):
         return 0.0
+    path = [held.effect for held in start.terms if held.effect.place is Place.COMMAND_PATH]
+    if any(p.dimension == "s" for effect in path for p in effect.parameters):
+        return 0.0  # the model has a delay or a lag of its own, which takes it in
     lacks = []
     for late in (-0.5, 0.0, 0.5):
         track = tracks_of(train, start, late)[-1]
