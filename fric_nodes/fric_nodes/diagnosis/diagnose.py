@@ -136,8 +136,8 @@ def diagnose(
     conditions = nominal_conditions(train) | dict(nominal.nominal)
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
-    train, validation, evened = evenly_stamped(train, validation, nominal)
-    corrected += evened
+    (train, evened), (validation, evened_too) = (evenly_stamped(held, nominal) for held in (train, validation))
+    corrected += [*evened, *evened_too]
     tracks, start = started(nominal, train)
     refuse_other_plant(train, tracks[0], start)
     corrected += held_as(tracks[0])

@@ -79,33 +79,29 @@ def started(nominal: Model, train: Sequence[Record], as_given: bool = False) -> 
     return tracks, best.model
 
 
-def evenly_stamped(
-    train: Sequence[Record], validation: Sequence[Record], nominal: Model
-) -> tuple[Sequence[Record], Sequence[Record], list[str]]:
+def evenly_stamped(records: Sequence[Record], nominal: Model) -> tuple[list[Record], list[str]]:
     """The recordings with even stamps, where theirs jitter and the model fits far better without that, and a note of it.
 
     A driver that samples by a clock and stamps what it has read when it comes around to it stamps unevenly what is even; one
     that samples when it comes around to it stamps as it should. Only the motion tells which.
     """
-    evened = [with_even_stamps(record) for record in train]
-    jitter = max(
-        float(np.std(each.time - record.time)) / record.sample_time for each, record in zip(evened, train, strict=True)
-    )
+    given, evened = list(records), [with_even_stamps(record) for record in records]
+    jitter = max(float(np.std(b.time - a.time)) / a.sample_time for a, b in zip(given, evened, strict=True))
     if nominal.plant.led or jitter < _JITTERS:
-        return train, validation, []
+        return given, []
     lacks = []
-    for held in (train, evened):
+    for held in (given, evened):
         model = _by_inverse_dynamics(nominal, held) or nominal
         track = tracks_of(held, model)[-1]
         residual = track.fit(model, free_names(model), FIRST_FIT, bounds_of(model, scales_of(track))).residual
         lacks.append(float(residual @ residual))
     if lacks[1] > _MUCH_BETTER * lacks[0]:
-        return train, validation, []
+        return given, []
     note = (
-        f"stamps jitter by {100.0 * jitter:.2g} % of a sample, and the motion does not: taken as even, which leaves "
-        f"{lacks[0] / max(lacks[1], 1e-300):.2g} times less unexplained; stamp where the sensor is read"
+        f"stamps of {given[0].source} jitter by {100.0 * jitter:.2g} % of a sample, and the motion does not: taken as even, "
+        f"which leaves {lacks[0] / max(lacks[1], 1e-300):.2g} times less unexplained; stamp where the sensor is read"
     )
-    return evened, [with_even_stamps(record) for record in validation], [note]
+    return evened, [note]
 
 
 def with_even_stamps(record: Record) -> Record:
@@ -118,8 +114,7 @@ def with_even_stamps(record: Record) -> Record:
     apart = np.maximum(np.round(step / record.sample_time), 1.0)
     number = np.concatenate([[0.0], np.cumsum(apart)])
     pieces = np.split(np.arange(number.shape[0]), np.flatnonzero(apart > 1.0) + 1)
-    longest = max(pieces, key=len)
-    period = float(np.polyfit(number[longest], record.time[longest], 1)[0])
+    period = float(np.polyfit(number, record.time, 1)[0])
     time = np.empty_like(record.time)
     for piece in pieces:
         time[piece] = period * number[piece] + float(np.mean(record.time[piece] - period * number[piece]))
