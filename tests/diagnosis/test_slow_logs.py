@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from fric_nodes.diagnosis import diagnose
 from fric_nodes.diagnosis.prove import draw
-from fric_nodes.diagnosis.start import evenly_stamped, lateness, with_even_stamps
+from fric_nodes.diagnosis.start import evenly_stamped, lateness
 from fric_nodes.identification.innovations import runs_of
+from fric_nodes.instrument import inspect
+from fric_nodes.instrument.stamps import with_even_stamps
 from fric_nodes.record import Array, Record
 
 pytestmark = pytest.mark.timeout(600)
@@ -104,6 +106,18 @@ def test_uneven_stamps_of_an_uneven_log_are_left_as_they_are() -> None:
     assert kept_as_it_is[0] is logs[0]
     assert notes == []
     assert not diagnose(logs[:1], logs[1:], case.nominal).findings
+
+
+@pytest.mark.parametrize(("lost", "words"), [((), "jitter by"), ((2000,), "samples are missing")])
+def test_jitter_is_not_taken_for_lost_samples_nor_one_lost_sample_for_jitter(lost: tuple[int, ...], words: str) -> None:
+    whole = draw(4, "nothing").train[0]
+    record = whole if lost else _jittering(whole, 0.2, 3)
+    kept = np.delete(np.arange(record.n_samples), lost)
+    logged = replace(record, time=record.time[kept], position=record.position[kept], effort=record.effort[kept])
+    stamps = next(check for check in inspect([logged]) if check.check == "stamps")
+    assert words in stamps.detail
+    assert ("missing" in stamps.detail) == bool(lost)
+    assert float(np.max(np.abs(np.diff(with_even_stamps(logged).time) - np.diff(whole.time[kept])))) < 1e-3 * whole.sample_time
 
 
 def test_even_stamps_are_found_beside_gaps() -> None:

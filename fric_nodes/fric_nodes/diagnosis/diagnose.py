@@ -387,7 +387,8 @@ def _grown(growth: Growth) -> tuple[Grown, ...]:
     excess = max(growth.begin.excess, 1e-300)
     found = [Grown("", 1.0, "")]
     for step in growth.steps:
-        rival = next(iter(step.rivals), None)
+        own = step.term.split("#")[0]
+        rival = next((each for each in step.rivals if each.effect.id != own), None)
         beside = "" if rival is None else f"{rival.effect.id}: {100 * max(rival.left - growth.begin.floor, 0.0) / excess:.3g} %"
         found.append(Grown(step.term, max(step.after - growth.begin.floor, 0.0) / excess, beside))
     return tuple(found)
@@ -536,7 +537,7 @@ def _finding(
 
 
 def _percent(part: float, whole: float) -> str:
-    return f"{percent(max(part, 0.0) / whole, 3)} %"
+    return f"{percent(min(max(part / whole, 0.0), 1.0), 3)} %"
 
 
 def _locating(validation: Sequence[Record], held: Track, growth: Growth) -> Track:

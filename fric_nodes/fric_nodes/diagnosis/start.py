@@ -15,6 +15,7 @@ from ..effect import Place
 from ..errors import InputError
 from ..identification import METHODS
 from ..identification.result import IdentificationError, Options
+from ..instrument.stamps import with_even_stamps
 from ..model import Model, build_model
 from ..plants import PLANTS
 from ..record import Record
@@ -35,7 +36,6 @@ __all__ = [
     "spread_of",
     "started",
     "tracks_of",
-    "with_even_stamps",
 ]
 
 BANDWIDTHS = (45.0, 140.0, 400.0)
@@ -102,24 +102,6 @@ def evenly_stamped(records: Sequence[Record], nominal: Model) -> tuple[list[Reco
         f"which leaves {lacks[0] / max(lacks[1], 1e-300):.2g} times less unexplained; stamp where the sensor is read"
     )
     return evened, [note]
-
-
-def with_even_stamps(record: Record) -> Record:
-    """``record`` with stamps a whole number of samples apart, but across gaps."""
-    every = np.arange(record.n_samples, dtype=np.float64)
-    line = np.polyval(np.polyfit(every, record.time, 1), every)
-    if float(np.max(np.abs(record.time - line))) < record.sample_time:  # none is missing
-        return replace(record, time=line - line[0])
-    step = np.diff(record.time)
-    apart = np.maximum(np.round(step / record.sample_time), 1.0)
-    number = np.concatenate([[0.0], np.cumsum(apart)])
-    pieces = np.split(np.arange(number.shape[0]), np.flatnonzero(apart > 1.0) + 1)
-    period = float(np.polyfit(number, record.time, 1)[0])
-    time = np.empty_like(record.time)
-    for piece in pieces:
-        time[piece] = period * number[piece] + float(np.mean(record.time[piece] - period * number[piece]))
-    time -= time[0]
-    return replace(record, time=time) if np.all(np.diff(time) > 0.0) else record
 
 
 def _by_inverse_dynamics(model: Model, train: Sequence[Record]) -> Model | None:

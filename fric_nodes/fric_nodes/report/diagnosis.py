@@ -31,8 +31,8 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
     """
     v = found.validation
     lead = (
-        f"{found.given.plant.title[0].upper()}{found.given.plant.title[1:]} '{found.given.joint}': {len(train)} recording(s) "
-        f"learnt from, {len(validation)} held back. Every figure here is on recordings "
+        f"{found.given.plant.title[0].upper()}{found.given.plant.title[1:]} '{found.given.joint}': "
+        f"{len(train)} recording{'s' if len(train) > 1 else ''} learnt from, {len(validation)} held back. Every figure here is on recordings "
         "that no fit has seen; they can only take findings away."
     )
     sections = [
