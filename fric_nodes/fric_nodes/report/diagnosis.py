@@ -30,9 +30,10 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
         validation: the recordings that were not.
     """
     v = found.validation
+    title = found.given.plant.title
+    learnt = f"{len(train)} recording{'s' if len(train) > 1 else ''} learnt from, {len(validation)} held back"
     lead = (
-        f"{found.given.plant.title[0].upper()}{found.given.plant.title[1:]} '{found.given.joint}': "
-        f"{len(train)} recording{'s' if len(train) > 1 else ''} learnt from, {len(validation)} held back. Every figure here is on recordings "
+        f"{title[0].upper()}{title[1:]} '{found.given.joint}': {learnt}. Every figure here is on recordings "
         "that no fit has seen; they can only take findings away."
     )
     sections = [
