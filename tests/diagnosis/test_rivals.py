@@ -24,18 +24,18 @@ def _axis(mass: float, share: float) -> Model:
 
 def test_hardly_any_mass_behind_a_spring_counts_as_a_mass_that_is_off() -> None:
     """A spring without a body behind it is the first micrometres of a contact."""
-    usual, light = implausible(2.0, _axis(2.0, 0.4)), implausible(2.0, _axis(2.0, 0.05))
+    usual, light = implausible([2.0], _axis(2.0, 0.4)), implausible([2.0], _axis(2.0, 0.05))
     assert usual == 0.0
-    assert light == pytest.approx(implausible(2.0, _axis(4.0, 0.4)))  # half of the least share, twice the mass
-    assert implausible(2.0, _axis(2.0, 0.1)) == 0.0
-    assert implausible(2.0, build_model("rigid", {"mass": 2.0}, [term("coulomb", force=4.0)])) == 0.0
+    assert light == pytest.approx(implausible([2.0], _axis(4.0, 0.4)))  # half of the least share, twice the mass
+    assert implausible([2.0], _axis(2.0, 0.1)) == 0.0
+    assert implausible([2.0], build_model("rigid", {"mass": 2.0}, [term("coulomb", force=4.0)])) == 0.0
 
 
 @pytest.mark.parametrize("ratio", [0.84, 1.0, 1.19])
 def test_a_mass_near_the_given_one_speaks_against_nothing(ratio: float) -> None:
-    assert mass_off(2.0, build_model("rigid", {"mass": 2.0 * ratio}, [])) == 0.0
-    assert mass_off(2.0, build_model("rigid", {"mass": 4.0 * ratio}, [])) > 0.5 * FAR_OFF
-    assert mass_off(2.0, build_model("rigid", {"mass": 4.0}, [])) == pytest.approx(FAR_OFF)
+    assert mass_off([2.0], build_model("rigid", {"mass": 2.0 * ratio}, [])) == 0.0
+    assert mass_off([2.0], build_model("rigid", {"mass": 4.0 * ratio}, [])) > 0.5 * FAR_OFF
+    assert mass_off([2.0], build_model("rigid", {"mass": 4.0}, [])) == pytest.approx(FAR_OFF)
 
 
 def test_what_has_passed_for_friction_leaves_it() -> None:

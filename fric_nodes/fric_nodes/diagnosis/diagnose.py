@@ -220,7 +220,7 @@ def _holds_inertia(found: Diagnosis, nominal: Model) -> bool:
     Observers count what a body lacks in the force that moves it: one without mass never lacks anything.
     """
     named = bool(found.findings) and found.findings[0].effect != "unknown"
-    return named and implausible(nominal.total_inertia, found.model) < FAR_OFF
+    return named and implausible((nominal.total_inertia,), found.model) < FAR_OFF
 
 
 def _corrected(
@@ -309,7 +309,7 @@ def _concluded(
     findings.sort(key=lambda each: -each.confidence * each.share)
     likely, stand_in = None, False
     # What needs a mass twice or half as large as the given one is no explanation.
-    far_off = min(mass_off(mass, end) for mass in (track.mass, nominal.total_inertia)) > FAR_OFF
+    far_off = mass_off((track.mass, nominal.total_inertia), end) > FAR_OFF
     # What is more likely wrong than right is no explanation either.
     doubtful = all(each.confidence < AS_LIKELY for each in findings)
     plain = growth.unhelped or growth

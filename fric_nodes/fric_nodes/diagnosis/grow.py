@@ -80,7 +80,7 @@ class Growth:
     def dear(self) -> float:
         """The price of its parameters, and of what is implausible about it."""
         n = sum(not p.shape for held in self.end.fit.model.terms for p in held.effect.parameters)
-        return PER_PARAMETER * n + implausible(self.track.mass, self.end.fit.model)
+        return PER_PARAMETER * n + implausible(self.track.masses, self.end.fit.model)
 
 
 def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None] | None = None) -> Growth:
@@ -170,7 +170,7 @@ def _compared(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None
     tried, begun = [first], {step.term.split("#")[0] for step in first.steps[:1]}
     for other in first.beginnings:
         best = min(tried, key=lambda each: _lacks(each) + each.dear)
-        lacks = _lacks(best) + implausible(best.track.mass, best.end.fit.model)
+        lacks = _lacks(best) + implausible(best.track.masses, best.end.fit.model)
         if len(tried) > _OTHER_BEGINNINGS or lacks < (_AGAIN if best.ended else _AGAIN_FOR_MORE):
             break
         if begun & {name.split("#")[0] for name in other.names}:

@@ -16,10 +16,16 @@ __all__ = ["laws_beside", "laws_further"]
 
 
 def laws_beside(held: Term) -> Iterator[Term]:
-    """By laws that aren't tried otherwise, where all that they ask for is known or has a default."""
+    """By other shapes that machines have, and by laws that aren't tried otherwise and ask for nothing that isn't known."""
     given = held.by_name
+    for p in held.effect.parameters:
+        for value in {p.default, *p.also} - {None, given[p.name]} if p.also else ():
+            assert value is not None
+            yield _taken_over(held.effect, given | {p.name: value}, lambda other: other.default)
     for law in EFFECTS.values():
         if law.id != held.effect.id or law.key == held.effect.key or law in worth_trying() or law.near:
+            continue
+        if law.form_of not in ("", held.effect.law):
             continue
         # A shape means something else in every law.
         known = {p.name: given[p.name] for p in law.parameters if p.name in given and not p.shape}

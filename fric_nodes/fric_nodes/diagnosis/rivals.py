@@ -396,7 +396,7 @@ def _side_by_side(track: Track, fitted: Sequence[Rival], unpaid: float) -> list[
 def _rival(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, found: Screening) -> Rival:
     effects = [each.column.term.effect for each in offer]
     left = unseen(track, fit, fit.residual) * (found.unpaid if _slips(offer) else 1.0)
-    dear = sum(price_of(effect, state.excess) for effect in effects) + state.excess * implausible(track.mass, fit.model)
+    dear = sum(price_of(effect, state.excess) for effect in effects) + state.excess * implausible(track.masses, fit.model)
     names = [name_of(fit.model, effect) for effect in effects]
     halfway = min((each.left for each in offer), default=left)
     return Rival(effects[0], left, fit, left, dear, offer, tuple(names), max(halfway, left), found.tried)
@@ -417,24 +417,25 @@ def price_of(effect: Effect, excess: float) -> float:
     return PER_PARAMETER * excess * sum(not p.shape for p in effect.parameters)
 
 
-def implausible(mass: float, model: Model) -> float:
+def implausible(masses: Sequence[float], model: Model) -> float:
     """What speaks against ``model`` whatever it explains, as a share of what is missing.
 
-    That is a mass far from a ``mass`` [F s^2/x] that was given, and a transmission with hardly any mass behind it: between a
+    That is a mass far from all ``masses`` [F s^2/x] that were given, and a transmission with hardly any mass behind it: between a
     spring that ends at a body and one that ends at friction, the first micrometres of a contact, no recording decides there.
     """
     share = model.value("load_share") if is_driven(model) else 1.0
-    return mass_off(mass, model) + FAR_OFF * max(math.log2(_LEAST_SHARE / share), 0.0) ** 2
+    return mass_off(masses, model) + FAR_OFF * max(math.log2(_LEAST_SHARE / share), 0.0) ** 2
 
 
-def mass_off(mass: float, model: Model) -> float:
-    """What it speaks against ``model`` to be far from a ``mass`` [F s^2/x] that was given, as a share of what is missing.
+def mass_off(masses: Sequence[float], model: Model) -> float:
+    """What it speaks against ``model`` to be far from all ``masses`` [F s^2/x] that were given, as a share of what is missing.
 
     A body that is far too light under a force that is taken away from it lacks little, whatever the machine does. A mass that
     is near speaks against nothing: it was fitted by a model that lacks something.
     """
     appended = sum(p.value for p in model.parameters() if "." in p.name and p.declaration.dimension == "F s^2/x")
-    off, near = math.log2((model.total_inertia + appended) / mass) ** 2, math.log2(_NEAR) ** 2
+    off = min(math.log2((model.total_inertia + appended) / mass) ** 2 for mass in masses)
+    near = math.log2(_NEAR) ** 2
     return FAR_OFF * max(off - near, 0.0) / (1.0 - near)
 
 

@@ -183,7 +183,7 @@ def _on_other_half(track: Track, model: Model, twin: Twin | None = None) -> floa
 def _price(track: Track, model: Model, name: str, excess: float) -> float:
     """What the term ``name`` of ``model`` costs, as rivals pay it [F^2]."""
     effect = model.terms[list(model.prefixes).index(name)].effect
-    return price_of(effect, excess) + excess * implausible(track.mass, model)
+    return price_of(effect, excess) + excess * implausible(track.masses, model)
 
 
 def _takes_its_place(track: Track, begin: State, without: State, state: State, own: float, rival: Rival) -> bool:
@@ -194,7 +194,7 @@ def _takes_its_place(track: Track, begin: State, without: State, state: State, o
     """
     if without.left - rival.left < _COMPARABLE * (without.left - state.left):
         return False
-    dearer = implausible(track.mass, rival.fit.model) - implausible(track.mass, state.fit.model)
+    dearer = implausible(track.masses, rival.fit.model) - implausible(track.masses, state.fit.model)
     more = max(dearer, 0.0) * max(begin.excess - without.excess, 0.0)
     # Twins that stick and slip each in its own way leave more than a recording does: no floor is higher than what is left.
     floor = min(state.floor, state.left, rival.left)
@@ -212,11 +212,12 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance, in_pairs=False)
         rivals = [rival for rival in rivals_of(track, without, found, scales, state.left) if rival.effect.id != effect_id]
         own = state.left + _price(track, state.fit.model, step.term, without.excess)
+        term = step.term
         if rivals and _takes_its_place(track, begin, without, state, own, rivals[0]):
-            state = refit(track, rivals[0].fit.model, max_iterations=6)
-            term, rivals = rivals[0].names[0], rivals[1:]
-        else:
-            term = step.term
+            other = refit(track, rivals[0].fit.model, max_iterations=6)
+            # What leaves something is not the simpler explanation beside one that leaves nothing.
+            if state.excess > OF_FLOOR * state.floor or other.left - state.left < OF_FLOOR * state.floor:
+                state, term, rivals = other, rivals[0].names[0], rivals[1:]
         price = _price(track, state.fit.model, term, without.excess)
         beside = without.left, state.left, without.floor, without.excess
         steps[k] = Step(term, *beside, tuple(rivals), found.tried, price)
@@ -248,7 +249,7 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
             without = refit(track, without_term(state.fit.model, effect_id), max_iterations=8)
             nothing = is_nothing(next(each for each in state.fit.model.terms if each.effect.id == effect_id))
             # What leaves an axis of another mass behind has only changed what stands in for what.
-            dearer = implausible(track.mass, without.fit.model) - implausible(track.mass, state.fit.model)
+            dearer = implausible(track.masses, without.fit.model) - implausible(track.masses, state.fit.model)
             lost = without.left - state.left + begin.excess * max(dearer, 0.0)
             alone = lost > NEARLY_ALL * without.excess and without.excess > CLEARLY * without.floor
             little = OF_FLOOR * state.floor if alone else max(OF_FLOOR * state.floor, _TO_STAY * begin.excess)

@@ -73,10 +73,11 @@ def started(nominal: Model, train: Sequence[Record], as_given: bool = False) -> 
     fits = [tracks[0].fit(start, free_names(start), FIRST_FIT, bounds) for start in starts]
     best = min(fits, key=lambda fit: float(fit.residual @ fit.residual))
     lacks = float(best.residual @ best.residual) / max(spread_of(tracks[0]), 1e-300)
-    if lacks > _LACKS_MUCH and not nominal.plant.led and mass_off(tracks[0].mass, nominal) > FAR_OFF:
+    if lacks > _LACKS_MUCH and not nominal.plant.led and mass_off((tracks[0].mass,), nominal) > FAR_OFF:
         # Where so much is missing that it makes up a mass of its own, the one given is the better measure.
         tracks = [replace(track, mass=nominal.total_inertia) for track in tracks]
-    return tracks, best.model
+    # Lag and viscous friction that are left out can make up a mass, too: what is plausible beside either is plausible.
+    return [replace(track, given=nominal.total_inertia) for track in tracks], best.model
 
 
 def evenly_stamped(records: Sequence[Record], nominal: Model) -> tuple[list[Record], list[str]]:

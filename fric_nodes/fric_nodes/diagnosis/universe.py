@@ -84,6 +84,7 @@ def worth_trying() -> tuple[Effect, ...]:
         effect
         for effect in EFFECTS.values()
         if not effect.near
+        and not effect.form_of
         and (effect.usual or effect.id not in usual or (effect.neutral is not None and usual[effect.id].neutral is None))
     )
 

@@ -1,63 +1,28 @@
 """Lag of second order of the actuator: a closed current or valve loop, two filters in a row, a command that rings.
 
-Equation: T^2 d^2f/dt^2 + 2 zeta T df/dt + f = u. A damping ratio of 1 is two lags of T in a row, less of it overshoots. With
-e = f - u and g = T de/dt, over a step of the length r T under a constant command,
-
-    e(r) = e(0) (C + zeta S) + g(0) S,    g(r) = g(0) (C - zeta S) - e(0) S,
-
-where C and S are exp(-zeta r) times cosh(r s) and sinh(r s)/s with s^2 = zeta^2 - 1, or cos and sin where that is negative.
-The mean of e follows from the equation itself, (g(0) - g(r) + 2 zeta (e(0) - e(r)))/r; over short steps, where these
-differences have no digits left, from its Taylor series. A run starts without force.
+Equation: T^2 d^2f/dt^2 + 2 zeta T df/dt + f = u. A damping ratio of 1 is two lags of T in a row, less of it overshoots. Over a
+step under a constant command it is solved exactly (:mod:`fric_nodes.steps.second_order`), and the mean force over the step is
+handed on. A run starts without force.
 Source: second-order model of servo valves and current loops, standard in control engineering.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from ..effect import Effect, Place
 from ..engine.kernel import kernel
 from ..parameter import Parameter
-from ..steps.first_order import mean_decay
+from ..steps.second_order import decayed
 
 __all__ = ["EFFECT"]
-
-_SHORT = 0.3  # of the step times the fastest rate: the Taylor series is exact to the last digit
-_TERMS = 13
-
-
-@kernel
-def _mean(e: float, g: float, r: float, damping: float) -> float:
-    """Mean of e over a short step, from its derivatives at the begin: each follows from the two before."""
-    before, at = e, g
-    total, factor = e, 1.0
-    for n in range(1, _TERMS):
-        factor *= r / (n + 1.0)
-        total += at * factor
-        before, at = at, -2.0 * damping * at - before
-    return total
 
 
 @kernel
 def command(u: float, h: float, y: Any, i: int, time: float, damping: float) -> float:
-    r = h / time
-    e, g = y[i] - u, y[i + 1] * time
-    d = damping * damping - 1.0
-    if d < 0.0:
-        w = math.sqrt(-d)
-        decay = math.exp(-damping * r)
-        c, s = decay * math.cos(w * r), decay * math.sin(w * r) / w
-    else:
-        w = math.sqrt(d)
-        slow = math.exp(-r / (damping + w))
-        s = slow * r * mean_decay(2.0 * w * r)
-        c = slow - w * s
-    after, change = e * (c + damping * s) + g * s, g * (c - damping * s) - e * s
+    mean, after, change = decayed(y[i] - u, y[i + 1] * time, h / time, damping)
     y[i], y[i + 1] = u + after, change / time
-    if r * (1.0 + 2.0 * damping) < _SHORT:
-        return float(u + _mean(e, g, r, damping))
-    return float(u + (g - change + 2.0 * damping * (e - after)) / r)
+    return float(u + mean)
 
 
 EFFECT = Effect(

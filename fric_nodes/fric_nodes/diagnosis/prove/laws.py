@@ -124,5 +124,5 @@ def given_force(p: Any, u: float) -> float:
         if p.dead_zone_form == 0.0:
             u = max(u - w, 0.0) + min(u + w, 0.0)
         else:
-            u -= w * math.tanh(1.5 * u / w)
+            u -= w * math.tanh(u / w)
     return u

@@ -31,6 +31,8 @@ def _rate(mass: float, force: float, velocity: float) -> float:
 
 EFFECT = Effect(
     id="accel_hysteresis",
+    law="rational",
+    usual=True,
     place=Place.SLIP_LEVEL,
     title="acceleration-dependent friction hysteresis",
     equation="F = (F_S - F_C) / (1 + (v/v_S)^2) sgn(v) where v dv/dt >= 0, else 0",

@@ -26,6 +26,8 @@ def force(c: Context, level_change: float, viscous_change: float) -> float:
 
 EFFECT = Effect(
     id="temperature",
+    law="linear",
+    usual=True,
     place=Place.SLIP_LEVEL,
     order=30,
     title="temperature-dependent friction",

@@ -27,6 +27,8 @@ def uncommand(f: float, width: float) -> float:
 
 EFFECT = Effect(
     id="input_deadzone",
+    law="hard",
+    usual=True,
     place=Place.COMMAND_PATH,
     title="dead zone of the input",
     equation="f = u - w sgn(u) where |u| > w, else 0",

@@ -28,6 +28,8 @@ def uncommand(f: float, limit: float) -> float:
 
 EFFECT = Effect(
     id="saturation",
+    law="hard",
+    usual=True,
     place=Place.COMMAND_PATH,
     title="saturation of the actuator",
     equation="f = max(-L, min(L, u))",
