@@ -113,12 +113,20 @@ def test_blocks_in_step_with_the_motion_are_refused() -> None:
 
 
 def test_other_laws_take_over_what_means_the_same() -> None:
-    laws = {each.effect.law: each for each in laws_beside(term("presliding", "lugre", stiffness=3.0, damping=0.5))}
-    assert set(laws) == {"dahl", "elasto_plastic"}
-    assert laws["elasto_plastic"].values == (3.0, 0.5, 0.7)
-    assert laws["dahl"].values == (3.0, 1.0)
-    # Laws that are candidates of their own aren't tried again.
-    assert not list(laws_beside(term("position_dependence", "periodic", cosine=1.0, sine=0.0, period=1.0)))
+    scales = scales_of(Track.of([strokes(20.0, True, 6)], 140.0, build_model("rigid", {"mass": 2.0}, [])))
+    laws = list(laws_beside(term("presliding", "lugre", stiffness=3.0, damping=0.5), scales))
+    found = {each.effect.law: each for each in laws}
+    assert set(found) == {"dahl", "elasto_plastic", "gms"}
+    assert found["elasto_plastic"].values == (3.0, 0.5, 0.7)
+    assert found["dahl"].values == (3.0, 1.0)
+    # A shape is tried with all values that machines have.
+    assert [each.by_name["exponent"] for each in laws if each.effect.law == "gms"] == [2.0, 4.0]
+    stribeck = term("stribeck", "exponential", force=2.0, velocity=0.1, exponent=1.0)
+    assert [each.by_name.get("exponent") for each in laws_beside(stribeck, scales)] == [2.0, None, None]
+    # Laws that are candidates of their own aren't tried again, and a form of one law takes no other's place.
+    assert not list(laws_beside(term("position_dependence", "periodic", cosine=1.0, sine=0.0, period=1.0), scales))
+    (peak,) = laws_beside(term("position_dependence", "local", amplitude=0.5, position=0.1, width=0.02), scales)
+    assert peak.values == (0.5, 0.1, 0.02, 1.0)
 
 
 def test_the_command_holds_blocks_of_one_recording_back(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def test_the_surplus_acts_while_speeding_up_in_either_direction(v: float, a: flo
 def test_at_rest_it_pushes_back_with_the_static_level_from_either_side() -> None:
     for side in (1.0, -1.0):
         c = Context(0.0, 0.0, side, 0.0, 1.0, 0.0, side, 0.0, np.zeros(0))
-        assert EFFECTS["accel_hysteresis"].level(c, F_C, F_S - F_C, V_S) == pytest.approx(F_S)  # type: ignore[misc]
+        assert EFFECTS["accel_hysteresis/rational"].level(c, F_C, F_S - F_C, V_S) == pytest.approx(F_S)  # type: ignore[misc]
         states, friction = Simulator(model_b()).run(np.full(50, 0.999999 * side * F_S), 1e-3)
         assert np.all(states == 0.0)
         assert np.all(friction == 0.999999 * side * F_S)

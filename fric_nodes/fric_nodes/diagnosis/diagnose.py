@@ -591,7 +591,7 @@ def _by_none(
     title: str, where: Where, likely: Signature, best: Tried | None, share: float, evidence: str, scored: Validation
 ) -> Finding:
     """The finding that no effect explains a ``share`` of what is missing, ``best`` being the one that comes closest."""
-    sure = unknown_confidence(share)
+    sure = unknown_confidence(share, scored.stands_out)
     return Finding(
         effect="unknown",
         law="",

@@ -302,10 +302,11 @@ def _added(
         # What is left may show best to another observer.
         track, state = best_track(tracks, best.fit.model, 6, floors, track)
         state, steps = merged(track, begin, state, steps)
-        if state.excess > NOTHING * state.floor and state.excess > min(_LITTLE * begin.excess, CLEARLY * state.floor):
+        missing = refit(track, begin.fit.model, max_iterations=4).excess  # to the observer that is asked now
+        if state.excess > NOTHING * state.floor and state.excess > min(_LITTLE * missing, CLEARLY * state.floor):
             state, steps = with_best_laws(track, state, steps, tell)
         scales = scales_of(track)
-        little = max(_LITTLE * refit(track, begin.fit.model, max_iterations=4).excess, FLOOR_KNOWN * state.floor)
+        little = max(_LITTLE * missing, FLOOR_KNOWN * state.floor)
         if state.excess < little and state.excess > CLEARLY * state.floor:
             least = max(least, NEARLY_ALL)  # beside an actuator at its limit all else is little
         elif state.excess < little:

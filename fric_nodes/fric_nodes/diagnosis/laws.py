@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from .candidates import scales_of
 from .fitting import State, refit
 from .other_laws import laws_beside
 from .settle import Step
@@ -29,7 +30,7 @@ def with_best_laws(track: Track, state: State, steps: Sequence[Step], tell: Call
         model = state.fit.model
         place = list(model.prefixes).index(step.term)
         best = state
-        for term in laws_beside(model.terms[place]):
+        for term in laws_beside(model.terms[place], scales_of(track)):
             tried = refit(track, model.with_terms(term if k == place else held for k, held in enumerate(model.terms)))
             best = min(best, tried, key=lambda each: each.left)
         if state.left - best.left <= _BETTER * state.excess or state.excess == 0.0:

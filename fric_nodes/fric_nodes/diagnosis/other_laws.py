@@ -14,14 +14,18 @@ from .universe import worth_trying
 
 __all__ = ["laws_beside", "laws_further"]
 
+_FOLLOWED = 5.0  # samples, in which sliding elements come after their level
 
-def laws_beside(held: Term) -> Iterator[Term]:
+
+def laws_beside(held: Term, scales: Scales) -> Iterator[Term]:
     """By other shapes that machines have, and by laws that aren't tried otherwise and ask for nothing that isn't known."""
     given = held.by_name
-    for p in held.effect.parameters:
-        for value in {p.default, *p.also} - {None, given[p.name]} if p.also else ():
-            assert value is not None
-            yield _taken_over(held.effect, given | {p.name: value}, lambda other: other.default)
+
+    def usual(p: Parameter) -> float | None:
+        # How fast sliding elements come after the level hardly shows; it has no natural value but by the recording.
+        return scales.level / (_FOLLOWED * scales.step) if p.dimension == "F/s" else p.default
+
+    yield from _shaped(held)
     for law in EFFECTS.values():
         if law.id != held.effect.id or law.key == held.effect.key or law in worth_trying() or law.near:
             continue
@@ -29,8 +33,18 @@ def laws_beside(held: Term) -> Iterator[Term]:
             continue
         # A shape means something else in every law.
         known = {p.name: given[p.name] for p in law.parameters if p.name in given and not p.shape}
-        if all(p.name in known or p.default is not None for p in law.parameters):
-            yield _taken_over(law, known, lambda p: p.default)
+        if all(p.name in known or usual(p) is not None for p in law.parameters):
+            term = _taken_over(law, known, usual)
+            yield term
+            yield from _shaped(term)
+
+
+def _shaped(held: Term) -> Iterator[Term]:
+    """``held`` with each other shape that machines have."""
+    given = held.by_name
+    for p in held.effect.parameters:
+        for value in p.also and sorted({p.default or 0.0, *p.also} - {given[p.name]}):
+            yield _taken_over(held.effect, given | {p.name: value}, lambda other: other.default)
 
 
 def laws_further(held: Term, scales: Scales) -> Iterator[Term]:

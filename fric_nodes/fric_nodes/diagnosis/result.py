@@ -12,6 +12,7 @@ import numpy as np
 from ..instrument import Finding as Check
 from ..model import Model
 from ..record import Array
+from .confidence import FAINT
 from .locate import Where
 
 __all__ = [
@@ -119,6 +120,11 @@ class Validation:
     noe_augmented: float
     noise_floor: float
 
+    @property
+    def stands_out(self) -> float:
+        """What the refitted model lacks beyond the noise, over that [1]."""
+        return max(self.noe_refit - self.noise_floor, 0.0) / max(self.noise_floor, 1e-300)
+
 
 @dataclass(frozen=True)
 class Unexplained:
@@ -214,7 +220,10 @@ class Diagnosis:
                 left = f" Several effects explain it only together, each doing part of the others' work: {helpful}."
             elif first and helpful:
                 left = f" Of its energy {percent(first.share)} % stay beside what helps: {helpful}."
-            return f"Something is missing, and no known effect explains it; it sits here: {where}.{left}"
+            why = "no known effect explains it"
+            if v.stands_out < FAINT:
+                why = "it is too faint beside the noise to tell what"
+            return f"Something is missing, and {why}; it sits here: {where}.{left}"
         named = (each for each in self.findings if each.effect != "unknown")
         names = listed([f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in named])
         return f"Missing: {names}; with it the NOE on unseen data falls from {v.noe_refit:.3g} % to {v.noe_augmented:.3g} %."

@@ -183,6 +183,7 @@ EFFECT = Effect(
             upper=10.0,
             default=2.0,
             shape=True,
+            also=(4.0,),
         ),
         Parameter("elements", "M", "1", "number of elements, a whole number", lower=1.0, upper=32.0, default=10.0, shape=True),
         Parameter("damping", "sigma", "F s/x", "damping while all elements stick", lower=0.0, default=0.0),
