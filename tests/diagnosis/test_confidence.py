@@ -29,6 +29,10 @@ def test_a_hundredth_of_the_mismatch_is_as_likely_a_mend_as_the_examinations_say
     assert odds[1] / odds[0] == pytest.approx(20.0**-0.7, rel=0.02)
 
 
+def test_what_is_fainter_than_the_noise_is_hardly_told() -> None:
+    assert unknown_confidence(0.0, 0.9) < 0.5 < unknown_confidence(0.0, 1.1) == unknown_confidence(0.0)
+
+
 def test_nobody_is_ever_certain() -> None:
     assert confidence_of(0.0, came(1.0), 1.0) < 1.0
     assert unknown_confidence(1.0) < 1.0

@@ -12,7 +12,9 @@ from fric_nodes.bagio import write_record
 from fric_nodes.cli.main import build_app
 from fric_nodes.diagnosis import DiagnosisError, diagnose
 from fric_nodes.diagnosis.blocks import in_blocks
+from fric_nodes.diagnosis.candidates import scales_of
 from fric_nodes.diagnosis.other_laws import laws_beside
+from fric_nodes.diagnosis.track import Track
 from fric_nodes.errors import InputError
 from fric_nodes.model import Model, build_model, term
 from fric_nodes.model_file import read_model, write_model

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.prove.cases import KINDS, VARIANTS, Case, draw, plan
+from fric_nodes.diagnosis.prove.cases import KINDS, VARIANTS, Case, Order, draw, make, plan
 from fric_nodes.diagnosis.prove.concealed import CONCEALED, clash
 from fric_nodes.diagnosis.prove.outside import OUTSIDE
 from fric_nodes.effects import EFFECTS
@@ -120,6 +120,11 @@ def test_other_forms_and_rates() -> None:
     half, double = draw(4, "moderate", "viscous", "half-rate"), draw(4, "moderate", "viscous", "double-rate")
     assert half.train[0].sample_time in (pytest.approx(1 / 250), pytest.approx(1 / 500))
     assert double.train[0].sample_time in (pytest.approx(1 / 1000), pytest.approx(1 / 2000))
+
+
+def test_an_axis_that_swings_up_at_some_strength_of_an_effect_is_drawn_weaker() -> None:
+    case = make(Order(73, 2031861075, "weak", ("actuator_lag",), "form"))
+    assert 3.0 <= case.key["noe_refit"] / case.key["noise_floor"] <= 5.0
 
 
 def test_refusals() -> None:

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from fric_nodes.diagnosis.universe import common_effects, universe_of
 from fric_nodes.effect import Effect
+from fric_nodes.effects import EFFECTS
 from fric_nodes.model import Model, Term, build_model, term
 from fric_nodes.record import Array
 from fric_nodes.simulate import Simulator, simulate
 
 H = 1e-3
 ABLE = common_effects()
+OTHERS = [each for each in EFFECTS.values() if each.neutral is not None and each not in ABLE and each.id != "stribeck"]
 
 
 def force() -> Array:
@@ -48,6 +50,16 @@ def test_neutral_values_leave_the_motion_as_it_was(effect: Effect) -> None:
         assert np.max(np.abs(run(values) - expected)) > 1e-3  # there it takes the base model's own friction away
         return
     assert np.max(np.abs(run(values) - expected)) <= 1e-9 * np.ptp(expected)
+
+
+@pytest.mark.parametrize("effect", OTHERS, ids=[effect.key for effect in OTHERS])
+def test_neutral_values_of_other_laws_leave_the_motion_as_it_was(effect: Effect) -> None:
+    held = base().with_terms((*base().terms, term("stribeck", force=2.0, velocity=0.05)))  # for what only lags
+    assert effect.neutral is not None
+    expected = simulate(held, force(), H).position
+    found = simulate(held.with_terms((*held.terms, Term(effect, effect.neutral))), force(), H).position
+    steps = 1e-5 if effect.rate is not None else 1e-9  # a lag asks for steps of its own
+    assert np.max(np.abs(found - expected)) <= steps * np.ptp(expected)
 
 
 def test_an_effect_with_an_amplitude_is_not_always_neutral() -> None:

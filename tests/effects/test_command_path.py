@@ -8,6 +8,7 @@ from fric_nodes.control.feedforward import Feedforward
 from fric_nodes.effects import EFFECTS
 from fric_nodes.model import build_model, term
 from fric_nodes.simulate import Simulator, predict_force, simulate
+from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm
 
 
@@ -25,12 +26,37 @@ def through(key: str, *p: float, u: float) -> float:
 
 def test_limits_and_dead_zone() -> None:
     for u, f in ((7.0, 5.0), (-7.0, -5.0), (4.9, 4.9), (0.0, 0.0)):
-        assert through("saturation", 5.0, u=u) == f
+        assert through("saturation/hard", 5.0, u=u) == f
     for u, f in ((7.0, 5.5), (-7.0, -5.5), (1.5, 0.0), (-1.4, 0.0), (1.6, 0.1), (0.0, 0.0)):
-        assert through("input_deadzone", 1.5, u=u) == pytest.approx(f)
-    assert EFFECTS["input_deadzone"].uncommand(0.0, 1.5) == 0.0  # type: ignore[misc]
-    assert EFFECTS["input_deadzone"].uncommand(-0.1, 1.5) == -1.6  # type: ignore[misc]
-    assert EFFECTS["saturation"].uncommand(9.0, 5.0) == 5.0  # type: ignore[misc]
+        assert through("input_deadzone/hard", 1.5, u=u) == pytest.approx(f)
+    assert EFFECTS["input_deadzone/hard"].uncommand(0.0, 1.5) == 0.0  # type: ignore[misc]
+    assert EFFECTS["input_deadzone/hard"].uncommand(-0.1, 1.5) == -1.6  # type: ignore[misc]
+    assert EFFECTS["saturation/hard"].uncommand(9.0, 5.0) == 5.0  # type: ignore[misc]
+
+
+def test_a_knee_joins_the_lines_without_a_corner() -> None:
+    """Against spline interpolation of value and slope where the parabola begins and ends, which determine it."""
+    limit, softness = 5.0, 0.3
+    begin, end = limit * (1.0 - softness), limit * (1.0 + softness)
+    knee = CubicHermiteSpline([begin, end], [begin, limit], [1.0, 0.0])
+    for u in np.linspace(-9.0, 9.0, 181):
+        size = abs(u)
+        expected = np.sign(u) * (size if size < begin else limit if size > end else float(knee(size)))
+        assert through("saturation/soft", limit, softness, u=u) == pytest.approx(expected, abs=1e-12)
+        # What a limiter cuts off is what a dead zone lets through.
+        assert through("input_deadzone/soft", limit, softness, u=u) == pytest.approx(u - expected, abs=1e-12)
+        assert through("saturation/soft", limit, 0.0, u=u) == through("saturation/hard", limit, u=u)
+        assert through("input_deadzone/soft", limit, 0.0, u=u) == pytest.approx(through("input_deadzone/hard", limit, u=u))
+
+
+@pytest.mark.parametrize("softness", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize(("key", "most"), [("saturation/soft", 4.999), ("input_deadzone/soft", 20.0)])
+def test_the_command_for_a_force_gives_that_force(key: str, most: float, softness: float) -> None:
+    uncommand = EFFECTS[key].uncommand
+    assert uncommand is not None
+    for f in np.linspace(-most, most, 41):
+        assert through(key, 5.0, softness, u=uncommand(f, 5.0, softness)) == pytest.approx(f, abs=1e-9)
+    assert through("saturation/soft", 5.0, softness, u=EFFECTS["saturation/soft"].uncommand(9.0, 5.0, softness)) == 5.0  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("seed", range(4))

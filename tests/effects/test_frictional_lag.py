@@ -1,4 +1,4 @@
-"""Friction that stays behind its steady curve: both laws against closed forms and an independent integration."""
+"""Friction that stays behind its steady curve: its laws against closed forms and an independent integration."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from fric_nodes.simulate import Predictor, Simulator
 from scipy.integrate import solve_ivp
 
 F_C, SURPLUS, V_S, F_V = 4.0, 3.0, 0.02, 10.0
-LAWS = pytest.mark.parametrize("law", ["first_order", "delay"])
+LAWS = pytest.mark.parametrize("law", ["first_order", "second_order", "delay"])
+MORE = {"second_order": (1.0,)}  # parameters beside the time
 
 
 def steady(v: np.ndarray) -> np.ndarray:
@@ -42,8 +43,8 @@ def followed(
     levels = np.empty(middles.shape[0])
     for k, (t, given) in enumerate(zip(middles, base(middles), strict=True)):
         c = Context(0.0, 0.1, 1.0, t, 1.0, 0.0, 0.0, h, memory)
-        levels[k] = effect.level(c, float(given), 0, time)
-        effect.remember(c, float(given), 0, time)
+        levels[k] = effect.level(c, float(given), 0, time, *MORE.get(law, ()))
+        effect.remember(c, float(given), 0, time, *MORE.get(law, ()))
     return middles, levels
 
 
@@ -59,14 +60,19 @@ def test_steady_friction_is_the_curve_itself(law: str) -> None:
 @LAWS
 def test_a_sinusoidal_level_comes_out_later_and_as_large_as_the_law_says(law: str) -> None:
     omega, tau = 2.0 * np.pi * 5.0, 0.02
-    gain, phase = (1.0, omega * tau) if law == "delay" else (1.0 / np.hypot(1.0, omega * tau), np.arctan(omega * tau))
+    passed = {
+        "delay": np.exp(-1j * omega * tau),
+        "first_order": 1.0 / (1.0 + 1j * omega * tau),
+        "second_order": 1.0 / (1.0 + 0.5j * omega * tau) ** 2,  # two lags of half the time
+    }[law]
+    gain, phase = float(np.abs(passed)), float(-np.angle(passed))
     errors = []
     for h in (2e-3, 1e-3, 5e-4):
         t, levels = followed(law, tau, lambda t: 5.0 + np.sin(omega * t), h, 1.0)
         expected = 5.0 + gain * np.sin(omega * t - phase)
         errors.append(float(np.max(np.abs(levels - expected)[t > 12 * tau])))
     assert errors[-1] < 5e-5
-    if law == "first_order":
+    if law != "delay":
         assert errors[0] / errors[2] > 12.0  # second order in the step
 
 
@@ -77,7 +83,7 @@ def test_steps_much_shorter_and_longer_than_the_lag(law: str, h: float) -> None:
     tau = 0.02
     t, levels = followed(law, tau, lambda t: 3.0 + 2.0 * t, h, max(0.6, 8 * h))
     late = t > 20 * tau
-    assert levels[late] == pytest.approx(3.0 + 2.0 * (t[late] - tau), abs=1e-7 + (2e-2 * h if law == "first_order" else 0.0))
+    assert levels[late] == pytest.approx(3.0 + 2.0 * (t[late] - tau), abs=1e-7 + (0.0 if law == "delay" else 2e-2 * h))
 
 
 def test_a_jump_of_the_level_comes_out_after_the_delay_and_not_before() -> None:
@@ -126,6 +132,28 @@ def test_first_order_in_a_moving_body_as_an_independent_integration_has_it() -> 
     assert 0.0 < np.min(states[:, 1]) < V_S  # it did go down to where the curve is steep
     assert np.ptp(friction) > 1.0
     assert worst < 1e-6 * np.ptp(states[:, 1])
+
+
+@pytest.mark.parametrize("damping", [0.4, 1.0, 3.0])
+def test_second_order_in_a_moving_body_as_an_independent_integration_has_it(damping: float) -> None:
+    tau, h, n = 0.01, 1e-3, 300
+    natural = 0.5 * tau / damping
+    model = model_with("second_order", tau, MASS).with_value("frictional_lag.damping", damping)
+    u = pushed("second_order", tau, h, n)
+    states, _ = Simulator(model, velocity=0.065).run(u, h, 8)
+    y = np.array([0.065, float(steady(np.array(0.065))), 0.0])
+    worst = 0.0
+    for k in range(n):
+        step = solve_ivp(
+            lambda _, y, k=k: [(u[k] - y[1] - F_V * y[0]) / MASS, y[2], (steady(y[0]) - y[1] - tau * y[2]) / natural**2],
+            (0.0, h),
+            y,
+            rtol=1e-9,
+            atol=1e-12,
+        )
+        y = step.y[:, -1]
+        worst = max(worst, abs(states[k, 1] - y[0]))
+    assert worst < 2e-6 * np.ptp(states[:, 1])
 
 
 def test_the_delay_in_a_moving_body_by_the_method_of_steps() -> None:

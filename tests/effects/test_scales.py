@@ -31,9 +31,29 @@ def test_scales_typed_a_second_time() -> None:
     assert scaled("time_drift/exponential", -0.4, 30.0, t=0.0) == 3.0
     assert scaled("time_drift/exponential", -0.4, 30.0, t=30.0) == pytest.approx(3.0 * (1.0 - 0.4 * 0.6321205588285577))
     assert scaled("time_drift/exponential", -0.4, 30.0, t=1e6) == pytest.approx(1.8)
-    assert scaled("temperature", -0.01, 0.3, temperature=20.0) == pytest.approx(2.4)
+    assert scaled("temperature/linear", -0.01, 0.3, temperature=20.0) == pytest.approx(2.4)
     c = Context(0.0, -0.5, -1.0, 0.0, 1.0, 20.0, 0.0, 0.0, np.zeros(0))
-    assert EFFECTS["temperature"].force(c, -0.01, -0.3) == pytest.approx(3.0)  # type: ignore[misc]
+    assert EFFECTS["temperature/linear"].force(c, -0.01, -0.3) == pytest.approx(3.0)  # type: ignore[misc]
+
+
+def test_scales_of_other_forms() -> None:
+    assert scaled("load_dependence/power", 2.0 / 3.0, load=8.0) == pytest.approx(12.0)
+    assert scaled("load_dependence/power", 1.4, load=1.0) == 3.0
+    assert scaled("load_dependence/power", 0.5, load=-1.0) == 0.0
+    # The bent law is the expansion of an exponential change, whose third order is what is left.
+    for warmer in (-10.0, 4.0, 20.0):
+        left = scaled("temperature/quadratic", -0.02, 0.0, 2e-4, 0.0, temperature=warmer) - 3.0 * np.exp(-0.02 * warmer)
+        assert left == pytest.approx(3.0 * (0.02 * warmer) ** 3 / 6.0, rel=0.12)
+    c = Context(0.0, -0.5, -1.0, 0.0, 1.0, 20.0, 0.0, 0.0, np.zeros(0))
+    assert EFFECTS["temperature/quadratic"].force(c, -0.01, -0.3, 0.0, 0.01) == pytest.approx(1.0)  # type: ignore[misc]
+    # A Lorentz curve, and nearly a bell; both are bent alike at the top.
+    assert scaled("position_dependence/peak", 0.5, 0.1, 0.02, 1.0, q=0.1) == 4.5
+    assert scaled("position_dependence/peak", 0.5, 0.1, 0.02, 1.0, q=0.1 + 0.02 * np.sqrt(2.0)) == pytest.approx(3.75)
+    bell = scaled("position_dependence/local", 0.5, 0.1, 0.02, q=0.11)
+    assert scaled("position_dependence/peak", 0.5, 0.1, 0.02, 20.0, q=0.11) == pytest.approx(bell, rel=1e-3)
+    assert scaled("position_dependence/peak", 0.5, 0.1, 0.02, 1.0, q=0.101) == pytest.approx(
+        4.5 - 0.5 * 1.5 * 0.05**2, abs=1e-5
+    )
 
 
 def test_what_depends_on_direction_is_scaled_too() -> None:

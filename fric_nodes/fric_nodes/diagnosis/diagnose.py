@@ -90,6 +90,8 @@ _ANY_JOINT = "axis"  # of a model that says nothing of it
 _UNDECIDED = 0.45  # confidence at most, where no parameter of an effect is as large as its own standard error
 _STILL = 12.0  # times the noise of a position, that hardly any sample of an hour is off by to either side
 _FLICKERS = 3  # values
+_LOOKED_AT = 2000  # samples
+_PASSES = 0.05  # of the force's energy: what lets less pass to the body doesn't move it by this force
 _LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that moves the body
 
 
@@ -155,7 +157,7 @@ def diagnose(
         corrected.append(note)
     tell("judging on the validation recordings")
     found = _concluded(train, validation, nominal, checks, corrected, tracks, searched, growth)
-    if massless and not _holds_inertia(found, nominal):
+    if massless and not _holds_inertia(found, nominal, train):
         raise DiagnosisError(
             train[0].source,
             f"the force doesn't hold the inertia of the model's mass {nominal.total_inertia:.3g}",
@@ -214,13 +216,23 @@ def _rests(position: Array) -> bool:
     return float(np.ptp(position)) <= _STILL * noise_of(position) or np.unique(position).size <= _FLICKERS
 
 
-def _holds_inertia(found: Diagnosis, nominal: Model) -> bool:
+def _holds_inertia(found: Diagnosis, nominal: Model, train: Sequence[Record]) -> bool:
     """Whether the force is the one that moves the body, where hardly any mass fitted it as it was: with all that is found.
 
-    Observers count what a body lacks in the force that moves it: one without mass never lacks anything.
+    Observers count what a body lacks in the force that moves it: one without mass never lacks anything. And a limit or a dead
+    zone that swallows nearly all of the force says the same in other words.
     """
     named = bool(found.findings) and found.findings[0].effect != "unknown"
-    return named and implausible((nominal.total_inertia,), found.model) < FAR_OFF
+    if not named or implausible((nominal.total_inertia,), found.model) > FAR_OFF:
+        return False
+    effort = np.concatenate([record.effort[record.mask] for record in train])
+    passed = effort[:: max(effort.shape[0] // _LOOKED_AT, 1)]
+    whole = float(passed @ passed)
+    for held in found.model.terms:
+        if held.effect.command is not None and held.effect.uncommand is not None:
+            command = held.effect.command
+            passed = np.array([command(u, 1.0, np.zeros(0), 0, *held.values) for u in passed])
+    return float(passed @ passed) > _PASSES * whole
 
 
 def _corrected(

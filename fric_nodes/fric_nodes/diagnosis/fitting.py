@@ -263,6 +263,9 @@ def bounds_of(model: Model, scales: Scales) -> Bounds:
                 continue
             if p.dimension == "F" and p.positive:
                 found[f"{prefix}.{p.name}"] = (_LOWEST_LIMIT * scales.most, math.inf)
+            elif p.dimension == "F" and held.effect.command is not None:
+                # What swallows more than the largest force recorded lets nothing pass that could move the axis.
+                found[f"{prefix}.{p.name}"] = (p.lower, max(scales.most, value))
             strength = p.name in held.effect.amplitudes or held.effect.play is not None
             places = p.dimension == "x" and not p.positive
             around = ranges if strength or places else ranges | scale_of

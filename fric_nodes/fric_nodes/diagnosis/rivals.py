@@ -420,8 +420,8 @@ def price_of(effect: Effect, excess: float) -> float:
 def implausible(masses: Sequence[float], model: Model) -> float:
     """What speaks against ``model`` whatever it explains, as a share of what is missing.
 
-    That is a mass far from all ``masses`` [F s^2/x] that were given, and a transmission with hardly any mass behind it: between a
-    spring that ends at a body and one that ends at friction, the first micrometres of a contact, no recording decides there.
+    That is a mass far from all ``masses`` [F s^2/x] that were given, and a transmission with hardly any mass behind it: between
+    a spring that ends at a body and one that ends at friction, the first micrometres of a contact, no recording decides there.
     """
     share = model.value("load_share") if is_driven(model) else 1.0
     return mass_off(masses, model) + FAR_OFF * max(math.log2(_LEAST_SHARE / share), 0.0) ** 2

@@ -1,7 +1,7 @@
 """Frictional lag of second order: friction that begins gently to follow its steady value, as a film that drains under a mass.
 
-Equation: T^2 d^2g/dt^2 + tau dg/dt + g = g_0 with T = tau/(2 zeta), with g_0 the slip level that the other terms give and g the
-one that acts. At low frequency it is the lag tau of the law ``first_order``; a damping ratio of 1 is two lags of tau/2 in a row.
+Equation: T^2 d^2g/dt^2 + tau dg/dt + g = g_0, T = tau/(2 zeta), with g_0 the slip level that the other terms give and g the one
+that acts. At low frequency it is the lag tau of the law ``first_order``; a damping ratio of 1 is two lags of tau/2 in a row.
 Source: squeezing a film out between two faces is an equation of second order where the normal motion has a mass: Hess and Soom
 1990; Al-Bender, Lampaert, Swevers 2004, section 10, whose asperity model rises over normal oscillations after a velocity step.
 

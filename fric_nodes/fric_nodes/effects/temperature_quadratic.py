@@ -16,9 +16,7 @@ __all__ = ["EFFECT"]
 
 
 @kernel
-def level(
-    c: Context, base: float, level_change: float, viscous_change: float, level_bend: float, viscous_bend: float
-) -> float:
+def level(c: Context, base: float, level_change: float, viscous_change: float, level_bend: float, viscous_bend: float) -> float:
     return base * (1.0 + (level_change + level_bend * c.temperature) * c.temperature)
 
 

@@ -112,7 +112,7 @@ class Bench:
         if physics.payload_time > 0.0:
             physics = physics.using({"payload_time": physics.payload_time + recording.shift})
         found = integrate(physics, loop, recording.course)
-        if not np.all(np.isfinite(found.command)) or np.ptp(found.seen) > 3.0 * at.travel:
+        if not np.all(np.isfinite(found.command)) or not np.ptp(found.seen) <= 3.0 * at.travel:
             raise Unreachable("the axis escapes")
         if np.quantile(np.abs(np.diff(found.seen)), 0.99) == 0.0:
             raise Unreachable("the axis hardly moves")
