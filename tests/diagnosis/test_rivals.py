@@ -7,7 +7,7 @@ import pytest
 from fric_nodes.diagnosis.along import Along
 from fric_nodes.diagnosis.candidates import candidates, scales_of
 from fric_nodes.diagnosis.fitting import refit, with_room
-from fric_nodes.diagnosis.other_laws import laws_further
+from fric_nodes.diagnosis.other_laws import laws_further, strained
 from fric_nodes.diagnosis.result import listed
 from fric_nodes.diagnosis.rivals import FAR_OFF, implausible, mass_off
 from fric_nodes.diagnosis.screen import Promise, screen
@@ -118,3 +118,19 @@ def test_a_spring_is_taken_further_by_as_much_as_the_force_would_show() -> None:
 
 def test_many_effects_are_told_one_after_another() -> None:
     assert [listed(names) for names in ([], ["a"], ["a", "b"], ["a", "b", "c"])] == ["", "a", "a and b", "a, b and c"]
+
+
+def test_any_of_several_masses_is_plausible() -> None:
+    light = build_model("rigid", {"mass": 0.5}, [])
+    assert mass_off([2.0, 0.55], light) == 0.0
+    assert mass_off([2.0], light) == mass_off([2.0, 9.0], light) > FAR_OFF
+
+
+def test_a_law_at_the_end_of_its_form_is_strained() -> None:
+    assert not strained(term("saturation", "soft", limit=3.0, softness=0.3))
+    assert strained(term("saturation", "soft", limit=3.0, softness=1.0))
+    assert strained(term("saturation", "soft", limit=3.0, softness=1e-4))  # which is a corner
+    assert not strained(term("saturation", "hard", limit=3.0))
+    # How strong an effect is doesn't bend it.
+    assert not strained(term("position_dependence", "periodic", cosine=1.0, sine=0.0, period=0.1))
+    assert not strained(term("load_dependence", "power", exponent=0.0))

@@ -20,7 +20,7 @@ from ..identification.equations import nominal_conditions
 from ..identification.statistics import noise_of, sandwich_covariance
 from ..instrument import Correction, inspect
 from ..instrument import Finding as Check
-from ..model import Model
+from ..model import Model, Term
 from ..record import Array, Record
 from ..threads import linear_algebra_in_one
 from .blocks import one_sided
@@ -33,6 +33,7 @@ from .grow import Growth, grow, helped, without_nothings
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
 from .locate import Where, locate, moved_back, steady
+from .other_laws import strained
 from .result import (
     Diagnosis,
     Estimate,
@@ -326,7 +327,9 @@ def _concluded(
     doubtful = all(each.confidence < AS_LIKELY for each in findings)
     plain = growth.unhelped or growth
     beside = growth.beyond > 0.0 or plain is not growth
-    if missing and (rest > _SIGNED or doubtful or far_off or beside or len(growth.steps) >= _MANY):
+    # A law that has run to the end of its form stands in for another.
+    bent = [held for step in growth.steps if strained(held := end.terms[list(end.prefixes).index(step.term)])]
+    if missing and (rest > _SIGNED or doubtful or far_off or beside or bent or len(growth.steps) >= _MANY):
         likely, of_all = _signature_of(searched, plain, max(rest, plain.rest), [each.share for each in findings])
         # Where one signature explains more than several effects do together, these have only stood in for it: a force that
         # swings at one frequency goes with the motion it makes there as a delay, a mode and bristles might.
@@ -334,7 +337,7 @@ def _concluded(
     # How well both shares are known depends on how far what is missing stands out, there and here.
     there = min(_LEFT_UNSEEN + _FLOOR_UNSURE * noise_floor / max(scored.noe_refit - noise_floor, 1e-300), _HARDLY)
     much = rest > _most_left(growth) or seen_rest > there
-    unknown = missing and (much or doubtful or stand_in or far_off or beside)
+    unknown = missing and (much or doubtful or stand_in or far_off or beside or bool(bent))
     unexplained = Unexplained(max(rest, growth.beyond), None)
     remains = None
     alone = None if learnt or not told else only_there(train, validation, held, begin)
@@ -371,7 +374,11 @@ def _concluded(
         refit=begin,
         given=nominal,
         prediction=tuple(_predictions(validation, held, left)),
-        notes=(*corrected, *_reservations(growth, nominal, far_off and bool(growth.steps)), *([] if told else [_TOO_LITTLE])),
+        notes=(
+            *corrected,
+            *_reservations(growth, nominal, far_off and bool(growth.steps), bent),
+            *([] if told else [_TOO_LITTLE]),
+        ),
         bandwidth=held.bandwidth,
         grown=_grown(growth),
         only_held_back=alone is not None,
@@ -415,7 +422,7 @@ def _paired(growth: Growth, noe: dict[str, float], noise_floor: float) -> bool:
     return bool(growth.steps) and noe["refit"] - noe["augmented"] > _KEPT * promised * noise_floor
 
 
-def _reservations(growth: Growth, nominal: Model, far_off: bool) -> list[str]:
+def _reservations(growth: Growth, nominal: Model, far_off: bool, bent: Sequence[Term]) -> list[str]:
     """Why the effects named are no full explanation, where the share that is left doesn't say it."""
     notes = []
     if growth.beyond > 0.0:
@@ -429,6 +436,10 @@ def _reservations(growth: Growth, nominal: Model, far_off: bool) -> list[str]:
             f"with the effects named the mass comes out at {fitted:.3g}, given was {nominal.total_inertia:.3g}: they are no "
             "explanation, unless the given one is off by more than two"
         )
+    notes += [
+        f"{held.effect.title} fits best at the very end of what its law can be: it stands in for something else"
+        for held in bent
+    ]
     return notes
 
 

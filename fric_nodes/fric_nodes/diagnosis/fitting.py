@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -49,6 +48,7 @@ _DRAWN = 8  # places each time
 _AFTER_A_SHAKE = 3  # iterations
 _WELL_KNOWN = 0.3
 _LOWEST_LIMIT = 0.01  # of the largest recorded force: a command may lie far beyond it
+_HIGHEST_LIMIT = 1.1
 _MOST_FORCE = 2.0  # of the largest recorded force, a term's
 
 
@@ -262,7 +262,8 @@ def bounds_of(model: Model, scales: Scales) -> Bounds:
             if p.linear or p.shape:
                 continue
             if p.dimension == "F" and p.positive:
-                found[f"{prefix}.{p.name}"] = (_LOWEST_LIMIT * scales.most, math.inf)
+                # A limit beyond all forces limits nothing: a knee below it would be another law of the gain.
+                found[f"{prefix}.{p.name}"] = (_LOWEST_LIMIT * scales.most, max(_HIGHEST_LIMIT * scales.most, value))
             elif p.dimension == "F" and held.effect.command is not None:
                 # What swallows more than the largest force recorded lets nothing pass that could move the axis.
                 found[f"{prefix}.{p.name}"] = (p.lower, max(scales.most, value))

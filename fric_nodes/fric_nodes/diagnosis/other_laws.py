@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 
@@ -12,8 +13,9 @@ from ..parameter import Parameter
 from .candidates import Scales
 from .universe import worth_trying
 
-__all__ = ["laws_beside", "laws_further"]
+__all__ = ["laws_beside", "laws_further", "strained"]
 
+_AT_THE_END = 1e-3  # of the range
 _FOLLOWED = 5.0  # samples, in which sliding elements come after their level
 
 
@@ -37,6 +39,16 @@ def laws_beside(held: Term, scales: Scales) -> Iterator[Term]:
             term = _taken_over(law, known, usual)
             yield term
             yield from _shaped(term)
+
+
+def strained(held: Term) -> bool:
+    """True where a number that says how the law is bent has run to a bound: it isn't by this law that the force is bent."""
+    for p, value in zip(held.effect.parameters, held.values, strict=True):
+        bends = p.dimension == "1" and p.default is not None and not p.shape and p.name not in held.effect.amplitudes
+        within = _AT_THE_END * (p.upper - p.lower)
+        if bends and math.isfinite(within) and min(value - p.lower, p.upper - value) < within:
+            return True
+    return False
 
 
 def _shaped(held: Term) -> Iterator[Term]:

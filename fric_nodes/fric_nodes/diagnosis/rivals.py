@@ -12,7 +12,7 @@ from ..threads import mapped
 from .along import Along
 from .candidates import Scales
 from .fitting import Beginning, State, begun, bounds_of, free_names, is_driven, shaken, unseen
-from .other_laws import laws_further
+from .other_laws import laws_beside, laws_further, strained
 from .screen import Screening, Tried
 from .track import Fit, Track
 
@@ -53,6 +53,7 @@ _AS_A_SPRING = 8  # iterations
 _FITTED_OUT = 3  # of such rivals
 _FACTORS = (0.25, 0.5, 2.0, 4.0)  # by which values are moved, from which they are fitted again
 _AGAIN = 4  # iterations
+_SHAPED = 3  # of the best, whose shapes and laws are compared, too
 _GIVES = (0.03, 0.3, 3.0)  # of the gap, that stops give under the typical force
 _FURTHER = 12  # iterations of a fit by a law that goes further
 _ROUGH = 0.02  # of what is missing: with more left, the best fits are begun again from around them
@@ -134,7 +135,9 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         fitted = _side_by_side(track, [*fitted, *giving], found.unpaid) if giving else fitted
     if to_beat > much:
         fitted = _side_by_side(track, _fitted_out(track, state, fitted, found, scales), found.unpaid)
-    return [*(_shaped(track, state, rival, found, scales) for rival in fitted[:1]), *fitted[1:]]
+    n_shaped = _SHAPED if to_beat > much else 1
+    shaped = [_shaped(track, state, rival, found, scales) for rival in fitted[:n_shaped]]
+    return _side_by_side(track, [*shaped, *fitted[n_shaped:]], found.unpaid)
 
 
 def _fitted_out(track: Track, state: State, fitted: list[Rival], found: Screening, scales: Scales) -> list[Rival]:
@@ -204,24 +207,31 @@ def _first_fit(track: Track, state: State, model: Model, scales: Scales) -> Fit:
 
 
 def _shaped(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> Rival:
-    """``rival`` with those shapes of its terms, among the ones that machines have, that leave least.
+    """``rival`` with those shapes and laws of its terms that leave least, as far as they are worth their price.
 
     What a wrong shape leaves would be taken for another effect.
     """
     best = rival
     for each in rival.offer:
-        effect = each.column.term.effect
-        for p in effect.parameters:
-            for value in p.also:
-                model, name = best.fit.model, f"{name_of(best.fit.model, effect)}.{p.name}"
-                values = model.values
-                values[model.names.index(name)] = value
-                model = model.with_values(values)
-                fit = track.fit(model, free_names(model), 8, bounds_of(model, scales))
-                other = _rival(track, state, rival.offer, fit, found)
-                if best.left - other.left > OF_FLOOR * state.floor:
-                    best = replace(other, fair=other.left * rival.fair / max(rival.left, 1e-300))
+        own = [k for k, held in enumerate(best.fit.model.terms) if held.effect is each.column.term.effect]
+        if not own or rival.left < (1.0 + OF_FLOOR) * state.floor:
+            continue
+        held = best.fit.model.terms[own[-1]]
+        for term in laws_beside(held, scales):
+            if term.effect.slip is not None and term.effect is not held.effect:
+                continue  # is tried when the effect has come
+            model = best.fit.model.with_terms(term if k == own[-1] else one for k, one in enumerate(best.fit.model.terms))
+            fit = track.fit(model, free_names(model), 8, bounds_of(model, scales))
+            other = _rival(track, state, rival.offer, fit, found)
+            dearer = rival.dear + price_of(term.effect, state.excess) - price_of(held.effect, state.excess) - best.dear
+            if best.left - other.left > max(OF_FLOOR * state.floor, dearer) and not strained(fit.model.terms[own[-1]]):
+                fair = other.left * rival.fair / max(rival.left, 1e-300)
+                best = replace(other, fair=fair, dear=best.dear + dearer)
     return best
+
+
+def _n_free(effect: Effect) -> int:
+    return sum(not p.shape for p in effect.parameters)
 
 
 def _extended(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> Rival:
@@ -414,7 +424,7 @@ def _slips(offer: Sequence[Tried]) -> bool:
 
 def price_of(effect: Effect, excess: float) -> float:
     """What the parameters of ``effect`` cost [F^2]."""
-    return PER_PARAMETER * excess * sum(not p.shape for p in effect.parameters)
+    return PER_PARAMETER * excess * _n_free(effect)
 
 
 def implausible(masses: Sequence[float], model: Model) -> float:

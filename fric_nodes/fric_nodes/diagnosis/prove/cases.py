@@ -47,6 +47,7 @@ _SLOW_LOG_SHARES = {"moderate": 0.42, "pair": 0.16, "unknown": 0.16, "nothing": 
 _EVERY = (2, 8)  # samples of the controller that a slow log holds one of
 _SLOWEST_LOG = 0.02  # [s]
 _RATE = {"half-rate": 0.5, "double-rate": 2.0}
+_NO_AXIS = 100.0  # [%]: where the nominal structure explains nothing, friction has stopped the axis, or it swings
 _MODERATE = (1.0, 15.0)
 _ATTEMPTS = 25
 _LARGEST_ASYMMETRY = 0.8  # of the Coulomb friction: with more, both together are another machine's friction of one direction
@@ -323,6 +324,8 @@ def _logged(record: Record, every: int) -> Record:
 
 def _check(kind: str, noe: float, floor: float) -> None:
     """Raise where the finished case isn't what its kind promises."""
+    if noe > _NO_AXIS:
+        raise Unreachable("a drive that can't move the axis")
     if kind == "nothing" and noe > 0.5 * floor:
         raise Unreachable(f"the reckoning leaves {noe:.3g} % where nothing is concealed")
     if kind == "weak" and not 3.0 <= noe / floor <= 5.0:
