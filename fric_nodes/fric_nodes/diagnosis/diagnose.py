@@ -328,7 +328,7 @@ def _concluded(
     plain = growth.unhelped or growth
     beside = growth.beyond > 0.0 or plain is not growth
     # A law that has run to the end of its form stands in for another.
-    bent = [held for step in growth.steps if strained(held := end.terms[list(end.prefixes).index(step.term)])]
+    bent = [term for term in (end.terms[list(end.prefixes).index(step.term)] for step in growth.steps) if strained(term)]
     if missing and (rest > _SIGNED or doubtful or far_off or beside or bent or len(growth.steps) >= _MANY):
         likely, of_all = _signature_of(searched, plain, max(rest, plain.rest), [each.share for each in findings])
         # Where one signature explains more than several effects do together, these have only stood in for it: a force that
