@@ -122,6 +122,16 @@ def test_other_forms_and_rates() -> None:
     assert double.train[0].sample_time in (pytest.approx(1 / 1000), pytest.approx(1 / 2000))
 
 
+@pytest.mark.parametrize("effect", [name for name, each in CONCEALED.items() if each.foreign])
+def test_laws_that_fric_has_not_are_drawn_too(effect: str) -> None:
+    case = draw(11, "moderate", effect, "foreign")
+    assert case.key["forms"][0] in CONCEALED[effect].foreign
+    assert 1.0 <= case.key["noe_refit"] <= 15.0
+    # Nor does the usual law with the same numbers explain it all, where their meaning is the same.
+    if effect in {"load_dependence", "temperature", "position_dependence", "saturation", "accel_hysteresis"}:
+        assert _noe(case, case.key["true_structure"]) > 3.0 * case.key["noise_floor"]
+
+
 def test_an_axis_that_swings_up_at_some_strength_of_an_effect_is_drawn_weaker() -> None:
     case = make(Order(73, 2031861075, "weak", ("actuator_lag",), "form"))
     assert 3.0 <= case.key["noe_refit"] / case.key["noise_floor"] <= 5.0
@@ -136,4 +146,4 @@ def test_refusals() -> None:
         plan(10, 1, "odd")
     with pytest.raises(InputError, match="cases"):
         plan(0, 1)
-    assert set(VARIANTS) == {"standard", "form", "half-rate", "double-rate", "mixed", "slow-log"}
+    assert set(VARIANTS) == {"standard", "form", "half-rate", "double-rate", "mixed", "slow-log", "foreign"}

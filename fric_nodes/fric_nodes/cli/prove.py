@@ -26,8 +26,8 @@ def prove(
         str,
         typer.Option(
             "--variant",
-            help="standard, form (laws other than the candidates' own), half-rate, double-rate, mixed (with other physics), or "
-            "slow-log (one of several samples).",
+            help="standard, form (laws other than the usual ones), foreign (laws that fric has not), half-rate, double-rate, "
+            "mixed (with other physics), or slow-log (one of several samples).",
         ),
     ] = "standard",
     jobs: Annotated[int | None, typer.Option("--jobs", help="Processes; as many as there are cores when not given.")] = None,

@@ -39,7 +39,7 @@ from .structure import nominal_model, relative_errors, true_model
 __all__ = ["KINDS", "VARIANTS", "Case", "Order", "draw", "plan"]
 
 KINDS = ("moderate", "weak", "pair", "unknown", "nothing", "mixed")
-VARIANTS = ("standard", "form", "half-rate", "double-rate", "mixed", "slow-log")
+VARIANTS = ("standard", "form", "half-rate", "double-rate", "mixed", "slow-log", "foreign")
 
 _SHARES = {"moderate": 0.32, "weak": 0.16, "pair": 0.16, "unknown": 0.15, "nothing": 0.21}
 _MIXED_SHARES = {"mixed": 0.5, "unknown": 0.5}  # what is found beside something unknown: rightly, and wrongly
@@ -108,8 +108,9 @@ def _counts(n_cases: int, shares: Mapping[str, float]) -> dict[str, int]:
 
 
 def _single_effects(variant: str) -> list[str]:
-    """What can be concealed alone; in the form variant only what has another form."""
-    return [name for name, each in CONCEALED.items() if variant != "form" or each.forms > 1]
+    """What can be concealed alone; in the variants of other forms only what has such a form."""
+    has = {"form": lambda each: each.forms > 1, "foreign": lambda each: bool(each.foreign)}.get(variant, lambda each: True)
+    return [name for name, each in CONCEALED.items() if has(each)]
 
 
 def _names(kind: str, count: int, variant: str, random: np.random.Generator) -> list[tuple[str, ...]]:
@@ -192,6 +193,8 @@ def _code(order: Order) -> tuple[int, int]:
 
 
 def _form(entry: Concealed, variant: str, random: np.random.Generator) -> int:
+    if variant == "foreign" and entry.foreign:
+        return int(random.choice(entry.foreign))
     return int(random.integers(1, entry.forms)) if variant == "form" and entry.forms > 1 else 0
 
 

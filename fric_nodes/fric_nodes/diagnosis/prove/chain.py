@@ -16,13 +16,12 @@ __all__ = ["N_STATES", "begin", "encoder", "stepped"]
 _ATTRACTION = 5e-3  # [s], in which the force of a slipping element settles
 _QUICK = 1e-3  # [s], over which the sign of the acceleration is taken
 
-# Places in the array of states: body, motor, side that touches (-1, 0, 1), force of the drive and its rate, heat, level behind
-# the lag (twice), whether that has begun, age of the contact, acceleration, stretch of the bristles, structure of the grease,
-# position of the chain, appendage ahead of the body and its velocity.
-_Q, _V, _Y, _W, _SIDE, _F, _F_RATE, _HEAT, _LAG, _LAG_2, _BEGUN, _AGE, _RISING, _STRETCH, _GREASE, _CHAIN, _HUNG, _HUNG_RATE = (
-    range(18)
-)
-N_STATES = 18
+# Places in the array of states: body, motor, side that touches (-1, 0, 1), force of the drive, its rate and the last of three
+# lags, heat, level behind the lag (twice), whether that has begun, age of the contact, acceleration, stretch of the bristles,
+# structure of the grease, position of the chain, appendage ahead of the body and its velocity.
+_Q, _V, _Y, _W, _SIDE, _F, _F_RATE, _F_LAST, _HEAT, _LAG, _LAG_2, _BEGUN = range(12)
+_AGE, _RISING, _STRETCH, _GREASE, _CHAIN, _HUNG, _HUNG_RATE = range(12, 19)
+N_STATES = 19
 
 
 @compiled
@@ -63,6 +62,13 @@ def _driven(p: Any, s: Any, late: Any, u: float, h: float, count: int, disturbed
         s[_F_RATE] += h * (a * a * (f - s[_F]) - 2.0 * a * s[_F_RATE])
         s[_F] += h * s[_F_RATE]
         f = s[_F]
+    elif p.actuator == 3.0:
+        # Three equal lags in a row.
+        r = h / (p.actuator_time / 3.0 + h)
+        s[_F] += r * (f - s[_F])
+        s[_F_RATE] += r * (s[_F] - s[_F_RATE])
+        s[_F_LAST] += r * (s[_F_RATE] - s[_F_LAST])
+        f = s[_F_LAST]
     if p.heat > 0.0:
         s[_HEAT] += h / p.heat_time * ((u / p.heat_force) ** 2 - s[_HEAT])
         f /= 1.0 + p.heat * s[_HEAT]
@@ -100,7 +106,7 @@ def _passed_on(p: Any, s: Any, f: float) -> float:
     if p.shaft > 0.0:
         if p.gap > 0.0 and beyond == 0.0:
             return 0.0
-        drive = p.shaft * beyond + p.shaft_cubic * beyond**3 + p.shaft_damping * slip
+        drive = p.shaft * beyond + p.shaft_square * abs(beyond) * beyond + p.shaft_cubic * beyond**3 + p.shaft_damping * slip
     elif p.stop_stiffness > 0.0 and beyond != 0.0:
         drive = p.stop_stiffness * beyond + p.stop_damping * slip
     else:
@@ -125,6 +131,11 @@ def _lagging(p: Any, s: Any, history: Any, g: float, h: float, count: int) -> fl
         s[_BEGUN] = 1.0
         s[_LAG] = g
         s[_LAG_2] = g
+    if p.lag == 4.0:
+        # Two parts of the contact, one quicker than the other.
+        s[_LAG] += h / (0.4 * p.lag_time + h) * (g - s[_LAG])
+        s[_LAG_2] += h / (1.6 * p.lag_time + h) * (g - s[_LAG_2])
+        return float(0.5 * (s[_LAG] + s[_LAG_2]))
     time = p.lag_time if p.lag == 1.0 else 0.5 * p.lag_time
     s[_LAG] += h / (time + h) * (g - s[_LAG])
     s[_LAG_2] += h / (time + h) * (s[_LAG] - s[_LAG_2])

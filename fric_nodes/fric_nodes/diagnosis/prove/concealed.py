@@ -3,7 +3,7 @@
 An entry says what the nominal structure must know for the effect to have a meaning (a lag needs a Stribeck curve to lag
 behind), what it must not know, which signals are recorded with it, and how its numbers follow from the axis, chance and the
 knob ``s``; ``s`` = 1 is a first guess, and strength grows with it. ``form`` 0 is the form in which fric's own candidate
-writes the law, others are of the same mechanism in another form.
+writes the law, others are of the same mechanism in another form, and ``foreign`` ones in a form that none of fric's laws has.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ class Concealed:
         effect: id of the vocabulary.
         make: from the axis, chance and a form to the numbers as a function of the knob; everything random is drawn once.
         forms: number of forms.
+        foreign: forms, beyond these or among them, for which fric has no law.
         needs: parts that the nominal structure must have.
         lacks: parts that neither it nor the axis may have.
         signals: recorded besides (``normal_load``, ``temperature``).
@@ -40,6 +41,7 @@ class Concealed:
     effect: str
     make: Maker
     forms: int = 1
+    foreign: tuple[int, ...] = ()
     needs: frozenset[str] = frozenset()
     lacks: frozenset[str] = frozenset()
     signals: tuple[str, ...] = ()
@@ -141,7 +143,7 @@ def _frictional_lag(at: Setting, random: np.random.Generator, form: int) -> Call
     return lambda s: {
         "stribeck": strong,
         "stribeck_velocity": velocity,
-        "lag": (1.0, 2.0, 3.0)[form],
+        "lag": (1.0, 2.0, 3.0, 4.0)[form],
         "lag_time": min(0.01 * s, 0.2),
     }
 
@@ -150,7 +152,7 @@ def _dwell_time(at: Setting, random: np.random.Generator, form: int) -> Callable
     time, length = _spread(random, 0.05, 0.3), at.travel * _spread(random, 0.0006, 0.002)
     return lambda s: {
         "dwell": 0.3 * s * at.friction,
-        "dwell_form": (1.0, 2.0, 3.0)[form],
+        "dwell_form": (1.0, 2.0, 3.0, 4.0)[form],
         "dwell_time": time,
         "dwell_length": length,
     }
@@ -161,7 +163,7 @@ def _load_dependence(at: Setting, random: np.random.Generator, form: int) -> Cal
 
 
 def _position_dependence(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
-    if form == 1 or (form == 0 and random.random() < 0.5):
+    if form > 0 or random.random() < 0.5:
         place, width = at.travel * float(random.uniform(-0.25, 0.25)), at.travel * float(random.uniform(0.03, 0.08))
         return lambda s: {"spot": 0.6 * s, "spot_position": place, "spot_width": width, "spot_form": float(form)}
     period, phase = at.travel * _spread(random, 0.15, 0.5), float(random.uniform(0, 2 * math.pi))
@@ -251,9 +253,11 @@ def _compliance(at: Setting, random: np.random.Generator, form: int) -> Callable
         frequency = 2.0 * math.pi * min(max(usual / math.sqrt(s), 3.0), at.band)
         stiffness = reduced * frequency**2
         found = {"load_share": share, "shaft": stiffness, "shaft_damping": 2.0 * ratio * reduced * frequency}
-        if form:
-            deflection = at.physics.mass * share * at.acceleration / stiffness
+        deflection = at.physics.mass * share * at.acceleration / stiffness
+        if form == 1:
             found["shaft_cubic"] = 0.3 * stiffness / deflection**2
+        elif form == 2:
+            found["shaft_square"] = 0.4 * stiffness / deflection
         return found
 
     return changes
@@ -289,30 +293,36 @@ _CATALOGUE = (
     Concealed("coulomb", _coulomb, lacks=frozenset({"coulomb", "stribeck", "presliding"})),
     Concealed("viscous", _viscous, lacks=frozenset({"viscous"}), group="speed"),
     Concealed("bias", _bias, lacks=frozenset({"bias"}), group="constant"),
-    Concealed("quadratic_drag", _quadratic_drag, forms=2, group="speed"),
-    Concealed("stribeck", _stribeck, forms=3, lacks=frozenset({"stribeck"}), group="low speed", largest=2.5),
+    Concealed("quadratic_drag", _quadratic_drag, forms=2, foreign=(2,), group="speed"),
+    Concealed("stribeck", _stribeck, forms=3, foreign=(3,), lacks=frozenset({"stribeck"}), group="low speed", largest=2.5),
     Concealed("asymmetry", _asymmetry, group="constant"),
-    Concealed("presliding", _presliding, forms=3, needs=frozenset({"coulomb"}), lacks=frozenset({"presliding"}), group="slip"),
     Concealed(
-        "frictional_lag", _frictional_lag, forms=3, needs=frozenset({"stribeck"}), lacks=frozenset({"presliding"}),
-        group="low speed",
+        "presliding", _presliding, forms=3, foreign=(1, 2), needs=frozenset({"coulomb"}), lacks=frozenset({"presliding"}),
+        group="slip",
     ),
-    Concealed("dwell_time", _dwell_time, forms=3, group="low speed", largest=4.0),
-    Concealed("load_dependence", _load_dependence, forms=2, signals=("normal_load",), group="scale"),
-    Concealed("position_dependence", _position_dependence, forms=2, group="place"),
+    Concealed(
+        "frictional_lag", _frictional_lag, forms=3, foreign=(3,), needs=frozenset({"stribeck"}),
+        lacks=frozenset({"presliding"}), group="low speed",
+    ),
+    Concealed("dwell_time", _dwell_time, forms=3, foreign=(3,), group="low speed", largest=4.0),
+    Concealed("load_dependence", _load_dependence, forms=2, foreign=(2,), signals=("normal_load",), group="scale"),
+    Concealed("position_dependence", _position_dependence, forms=2, foreign=(2,), group="place"),
     Concealed("time_drift", _time_drift, group="time"),
-    Concealed("temperature", _temperature, forms=2, signals=("temperature",), group="time"),
-    Concealed("accel_hysteresis", _accel_hysteresis, forms=2, lacks=frozenset({"stribeck"}), group="low speed", largest=2.5),
+    Concealed("temperature", _temperature, forms=2, foreign=(1, 2), signals=("temperature",), group="time"),
+    Concealed(
+        "accel_hysteresis", _accel_hysteresis, forms=2, foreign=(2,), lacks=frozenset({"stribeck"}), group="low speed",
+        largest=2.5,
+    ),
     Concealed("ripple", _ripple, group="place"),
     Concealed("backlash", _backlash, group="transmission"),
     Concealed("impact_backlash", _impact_backlash, group="transmission"),
-    Concealed("compliance", _compliance, forms=2, group="transmission"),
+    Concealed("compliance", _compliance, forms=2, foreign=(2,), group="transmission"),
     Concealed("stiffness", _stiffness, group="spring"),
     Concealed("nonlinear_stiffness", _nonlinear_stiffness, group="spring"),
-    Concealed("actuator_lag", _actuator_lag, forms=2, group="command"),
+    Concealed("actuator_lag", _actuator_lag, forms=2, foreign=(2,), group="command"),
     Concealed("delay", _delay, group="command"),
-    Concealed("saturation", _saturation, forms=2, group="command", largest=8.0),
-    Concealed("input_deadzone", _input_deadzone, forms=2, group="command"),
+    Concealed("saturation", _saturation, forms=2, foreign=(1,), group="command", largest=8.0),
+    Concealed("input_deadzone", _input_deadzone, forms=2, foreign=(1,), group="command"),
 )  # fmt: skip
 
 CONCEALED: dict[str, Concealed] = {each.effect: each for each in _CATALOGUE}

@@ -3,7 +3,8 @@
 Everything here is written from the papers once more. Where the concealed law must not be the candidate's own form (``form``
 other than 0), the other form is one that the literature uses for the same mechanism: Hess and Soom 1990 and Tustin 1947 for
 the fall of friction with speed, a power of the load, an Arrhenius-like change with temperature, a Lorentz curve for a tight
-spot, a soft knee for an amplifier.
+spot, a soft knee for an amplifier. The last form of each is one that fric has no law for: a hyperbolic secant for falls with
+the speed, Vogel's viscosity, a spot with a flat top, a root of the load, drag of mixed powers, rest after Kato's root.
 """
 
 from __future__ import annotations
@@ -48,11 +49,18 @@ def level_before_lag(p: Any, v: float, direction: float, rising: float, age: flo
             g += p.stribeck * math.exp(-r * r)
         elif p.stribeck_form == 1.0:
             g += p.stribeck / (1.0 + r * r)
-        else:
+        elif p.stribeck_form == 2.0:
             g += p.stribeck * math.exp(-r)
+        else:
+            g += p.stribeck / math.cosh(min(1.3 * r, 300.0))
     if p.acceleration > 0.0 and direction * rising >= 0.0:
         r = speed / p.acceleration_velocity
-        g += p.acceleration / (1.0 + r * r) if p.acceleration_form == 0.0 else p.acceleration * math.exp(-r * r)
+        if p.acceleration_form == 0.0:
+            g += p.acceleration / (1.0 + r * r)
+        elif p.acceleration_form == 1.0:
+            g += p.acceleration * math.exp(-r * r)
+        else:
+            g += p.acceleration / math.cosh(min(1.3 * r, 300.0))
     if p.dwell > 0.0:
         g += surplus_of_age(p, age)
     return float(g)
@@ -66,7 +74,9 @@ def surplus_of_age(p: Any, age: float) -> float:
         return float(p.dwell * math.log(1.0 + r))
     if p.dwell_form == 2.0:
         return float(p.dwell * (1.0 - math.exp(-r)))
-    return float(p.dwell * r / (1.0 + r))
+    if p.dwell_form == 3.0:
+        return float(p.dwell * r / (1.0 + r))
+    return float(p.dwell * (1.0 - math.exp(-math.sqrt(r))))
 
 
 @compiled
@@ -74,12 +84,27 @@ def scaled(p: Any, g: float, q: float, direction: float, t: float, load: float, 
     """The level [N] after asymmetry and everything that scales it, never below zero."""
     g += direction * p.asymmetry
     if p.load != 0.0:
-        g *= 1.0 + p.load * (load - 1.0) if p.load_form == 0.0 else load**p.load
+        if p.load_form == 0.0:
+            g *= 1.0 + p.load * (load - 1.0)
+        elif p.load_form == 1.0:
+            g *= load**p.load
+        else:
+            g *= 1.0 + 2.0 * p.load * (math.sqrt(load) - 1.0)
     if p.temperature != 0.0:
-        g *= 1.0 + p.temperature * warmer if p.temperature_form == 0.0 else math.exp(p.temperature * warmer)
+        if p.temperature_form == 0.0:
+            g *= 1.0 + p.temperature * warmer
+        elif p.temperature_form == 1.0:
+            g *= math.exp(p.temperature * warmer)
+        else:
+            g *= math.exp(p.temperature * warmer / (1.0 + warmer / 90.0))
     if p.spot != 0.0:
         d = (q - p.spot_position) / p.spot_width
-        g *= 1.0 + (p.spot * math.exp(-0.5 * d * d) if p.spot_form == 0.0 else p.spot / (1.0 + d * d))
+        if p.spot_form == 0.0:
+            g *= 1.0 + p.spot * math.exp(-0.5 * d * d)
+        elif p.spot_form == 1.0:
+            g *= 1.0 + p.spot / (1.0 + d * d)
+        elif abs(d) < 2.0:
+            g *= 1.0 + 0.5 * p.spot * (1.0 + math.cos(math.pi * max(abs(d) - 1.0, 0.0)))
     if p.wave_cosine != 0.0 or p.wave_sine != 0.0:
         phase = _TWO_PI * q / p.wave_period
         g *= 1.0 + p.wave_cosine * math.cos(phase) + p.wave_sine * math.sin(phase)
@@ -96,8 +121,10 @@ def smooth_force(p: Any, q: float, v: float, t: float, warmer: float, thinned: f
     if p.drag > 0.0:
         if p.drag_form == 0.0:
             f += p.drag * v * abs(v)
-        else:
+        elif p.drag_form == 1.0:
             f += p.drag * p.drag_velocity**0.25 * math.copysign(abs(v) ** 1.75, v)
+        else:
+            f += p.drag * v * abs(v) * (0.4 + 0.6 * abs(v) / p.drag_velocity)
     if p.ripple_cosine != 0.0 or p.ripple_sine != 0.0:
         phase = _TWO_PI * q / p.ripple_period
         f += p.ripple_cosine * math.cos(phase) + p.ripple_sine * math.sin(phase)

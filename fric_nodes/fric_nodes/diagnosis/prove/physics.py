@@ -26,29 +26,29 @@ class Physics:
         coulomb: level [N].
         viscous: [N s/m].
         bias: [N], against positive motion.
-        stribeck, stribeck_velocity, stribeck_form: surplus [N], [m/s]; form 0 Gaussian, 1 Hess and Soom, 2 Tustin.
-        acceleration, acceleration_velocity, acceleration_form: while speeding up [N], [m/s]; 0 Hess and Soom, 1 Gaussian.
+        stribeck, stribeck_velocity, stribeck_form: surplus [N], [m/s]; form 0 Gaussian, 1 Hess and Soom, 2 Tustin, 3 secant.
+        acceleration, acceleration_velocity, acceleration_form: speeding up [N], [m/s]; 0 Hess and Soom, 1 Gaussian, 2 secant.
         asymmetry, asymmetry_viscous: half the difference forward less backward [N], [N s/m].
-        drag, drag_form: [N s^2/m^2]; form 1: exponent 1.75 instead of 2, the same at the speed ``drag_velocity`` [m/s].
+        drag, drag_form: [N s^2/m^2]; form 1: exponent 1.75 instead of 2, 2: partly 3, the same at ``drag_velocity`` [m/s].
         presliding: 0 rigid, 1 bristle, 2 elements with slip dynamics, 3 population of elements that stick or slip.
         displacement: pre-sliding displacement, level over stiffness [m].
         presliding_damping: [N s/m], of the bristle or of the elements together.
-        lag, lag_time: 1 first order, 2 second order, 3 pure delay; [s].
-        dwell, dwell_form, dwell_time, dwell_length: [N], 1 logarithmic, 2 exponential, 3 hyperbolic; [s], [m].
-        load, load_form: relative change of the level per relative change of the load; form 1: a power of it.
-        temperature, temperature_viscous, temperature_form: [1/K], [N s/m/K]; form 1: an exponential.
-        spot, spot_position, spot_width, spot_form: relative, [m], [m]; form 1: a Lorentz curve.
+        lag, lag_time: 1 first order, 2 second order, 3 pure delay, 4 two lags side by side; [s].
+        dwell, dwell_form, dwell_time, dwell_length: [N], 1 logarithmic, 2 exponential, 3 hyperbolic, 4 of a root; [s], [m].
+        load, load_form: relative change of the level per relative change of the load; form 1: a power of it, 2: its root.
+        temperature, temperature_viscous, temperature_form: [1/K], [N s/m/K]; form 1: an exponential, 2: Vogel's.
+        spot, spot_position, spot_width, spot_form: relative, [m], [m]; form 1: a Lorentz curve, 2: flat at its top.
         wave_cosine, wave_sine, wave_period: relative, [m].
         drift, drift_time: relative change per second or, with a time [s], in the long run.
         ripple_cosine, ripple_sine, ripple_period: [N], [m].
         stiffness, stiffness_position, cubic, cubic_position: [N/m], [m], [N/m^3], [m].
         gap, stop_stiffness, stop_damping: play [m]; its ends are rigid without a stiffness [N/m], [N s/m].
-        shaft, shaft_damping, shaft_cubic: between both bodies [N/m], [N s/m], [N/m^3].
+        shaft, shaft_damping, shaft_square, shaft_cubic: between both bodies [N/m], [N s/m], [N/m^2], [N/m^3].
         appendage, appendage_frequency, appendage_damping: [kg], [Hz], ratio.
         limit, limit_form: of the actuator [N]; form 1: a soft knee.
         dead_zone, dead_zone_form: half width [N]; form 1: rounded.
         delay: [s].
-        actuator, actuator_time: 1 first order, 2 second order; [s].
+        actuator, actuator_time: 1 first, 2 second, 3 third order; [s].
         payload, payload_time: mass that joins [kg] at a time [s].
         heat, heat_time, heat_force: loss of gain at the usual force, [s], that force [N].
         dip: loss of gain in the windows.
@@ -112,6 +112,7 @@ class Physics:
     stop_damping: float = 0.0
     shaft: float = 0.0
     shaft_damping: float = 0.0
+    shaft_square: float = 0.0
     shaft_cubic: float = 0.0
     appendage: float = 0.0
     appendage_frequency: float = 1.0

@@ -87,14 +87,14 @@ def _time_drift(p: Physics) -> Term:
 
 
 def _dwell_time(p: Physics) -> Term:
-    law = {1.0: "logarithmic", 2.0: "exponential"}.get(p.dwell_form, "hyperbolic")
+    law = {1.0: "logarithmic", 3.0: "hyperbolic"}.get(p.dwell_form, "exponential")
     return term("dwell_time", law, force=p.dwell, time=p.dwell_time, length=p.dwell_length)
 
 
 _MADE: Mapping[str, Callable[[Physics], Term]] = {
     "quadratic_drag": lambda p: term("quadratic_drag", coefficient=p.drag),
     "asymmetry": lambda p: term("asymmetry", force=p.asymmetry, coefficient=p.asymmetry_viscous),
-    "frictional_lag": lambda p: term("frictional_lag", "first_order" if p.lag < 3.0 else "delay", time=p.lag_time),
+    "frictional_lag": lambda p: term("frictional_lag", "delay" if p.lag == 3.0 else "first_order", time=p.lag_time),
     "dwell_time": _dwell_time,
     "load_dependence": lambda p: term("load_dependence", "scaling", coefficient=p.load),
     "position_dependence": _position_dependence,
