@@ -109,8 +109,12 @@ def _counts(n_cases: int, shares: Mapping[str, float]) -> dict[str, int]:
 
 def _single_effects(variant: str) -> list[str]:
     """What can be concealed alone; in the variants of other forms only what has such a form."""
-    has = {"form": lambda each: each.forms > 1, "foreign": lambda each: bool(each.foreign)}.get(variant, lambda each: True)
-    return [name for name, each in CONCEALED.items() if has(each)]
+    found = list(CONCEALED.items())
+    if variant == "form":
+        found = [(name, each) for name, each in found if each.forms > 1]
+    if variant == "foreign":
+        found = [(name, each) for name, each in found if each.foreign]
+    return [name for name, _ in found]
 
 
 def _names(kind: str, count: int, variant: str, random: np.random.Generator) -> list[tuple[str, ...]]:
