@@ -7,7 +7,7 @@ import pytest
 from fric_nodes.diagnosis.along import Along
 from fric_nodes.diagnosis.candidates import candidates, scales_of
 from fric_nodes.diagnosis.fitting import refit, with_room
-from fric_nodes.diagnosis.other_laws import laws_further, strained
+from fric_nodes.diagnosis.other_laws import laws_further, strained, told
 from fric_nodes.diagnosis.result import listed
 from fric_nodes.diagnosis.rivals import FAR_OFF, implausible, mass_off
 from fric_nodes.diagnosis.screen import Promise, screen
@@ -134,3 +134,12 @@ def test_a_law_at_the_end_of_its_form_is_strained() -> None:
     # How strong an effect is doesn't bend it.
     assert not strained(term("position_dependence", "periodic", cosine=1.0, sine=0.0, period=0.1))
     assert not strained(term("load_dependence", "power", exponent=0.0))
+
+
+def test_tails_of_a_place_that_was_not_visited_tell_of_no_other_law() -> None:
+    time = np.arange(4000) * 1e-3
+    record = Record(time, 0.1 * np.sin(time), np.cos(time), source="swing")
+    scales = scales_of(Track.of([record], 140.0, build_model("rigid", {"mass": 2.0}, [])))
+    for place, seen in ((0.05, True), (0.3, False)):
+        spot = term("position_dependence", "peak", amplitude=0.5, position=place, width=0.02, exponent=1.0)
+        assert told(spot, scales) is seen

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from .candidates import scales_of
 from .fitting import State, refit
-from .other_laws import laws_beside, strained
+from .other_laws import laws_beside, told
 from .settle import Step
 from .track import Track
 
@@ -32,7 +32,7 @@ def with_best_laws(track: Track, state: State, steps: Sequence[Step], tell: Call
         best = state
         for term in laws_beside(model.terms[place], scales_of(track)):
             tried = refit(track, model.with_terms(term if k == place else held for k, held in enumerate(model.terms)))
-            if not strained(tried.fit.model.terms[place]):
+            if told(tried.fit.model.terms[place], scales_of(track)):
                 best = min(best, tried, key=lambda each: each.left)
         if state.left - best.left <= _BETTER * state.excess or state.excess == 0.0:
             continue

@@ -13,7 +13,7 @@ from ..parameter import Parameter
 from .candidates import Scales
 from .universe import worth_trying
 
-__all__ = ["laws_beside", "laws_further", "strained"]
+__all__ = ["laws_beside", "laws_further", "strained", "told"]
 
 _AT_THE_END = 1e-3  # of the range
 _FOLLOWED = 5.0  # samples, in which sliding elements come after their level
@@ -49,6 +49,15 @@ def strained(held: Term) -> bool:
         if bends and math.isfinite(within) and min(value - p.lower, p.upper - value) < within:
             return True
     return False
+
+
+def told(held: Term, scales: Scales) -> bool:
+    """Whether a recording of these ``scales`` tells ``held`` from the usual law: its place was visited, its form is no end."""
+    for p, value in zip(held.effect.parameters, held.values, strict=True):
+        place = held.effect.level is not None and p.dimension == "x" and not p.positive
+        if place and not scales.low <= value <= scales.high:
+            return False
+    return not strained(held)
 
 
 def _shaped(held: Term) -> Iterator[Term]:

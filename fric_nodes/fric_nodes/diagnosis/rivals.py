@@ -12,7 +12,7 @@ from ..threads import mapped
 from .along import Along
 from .candidates import Scales
 from .fitting import Beginning, State, begun, bounds_of, free_names, is_driven, shaken, unseen
-from .other_laws import laws_beside, laws_further, strained
+from .other_laws import laws_beside, laws_further, told
 from .screen import Screening, Tried
 from .track import Fit, Track
 
@@ -224,7 +224,7 @@ def _shaped(track: Track, state: State, rival: Rival, found: Screening, scales: 
             fit = track.fit(model, free_names(model), 8, bounds_of(model, scales))
             other = _rival(track, state, rival.offer, fit, found)
             dearer = rival.dear + price_of(term.effect, state.excess) - price_of(held.effect, state.excess) - best.dear
-            if best.left - other.left > max(OF_FLOOR * state.floor, dearer) and not strained(fit.model.terms[own[-1]]):
+            if best.left - other.left > max(OF_FLOOR * state.floor, dearer) and told(fit.model.terms[own[-1]], scales):
                 fair = other.left * rival.fair / max(rival.left, 1e-300)
                 best = replace(other, fair=fair, dear=best.dear + dearer)
     return best
