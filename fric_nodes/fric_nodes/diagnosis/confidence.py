@@ -60,7 +60,7 @@ def unknown_confidence(rest: float, stands_out: float = math.inf) -> float:
     Args:
         rest: share of what is missing that is left unexplained.
         stands_out: what is missing, over the noise floor. Where it is less than that, known effects can't be told from each
-            other either: it was one of these in all seven of such cases among 700 (seeds 81 to 95).
+            other either: it was one of these in all six of such cases among 700 (seeds 81 to 95).
     """
     if stands_out < FAINT:
         return _FAINTLY_UNKNOWN
