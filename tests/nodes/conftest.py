@@ -21,12 +21,14 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 NodeT = TypeVar("NodeT", bound=Node)
 LIMIT = 90.0  # [s] generous: a wait ends when its condition holds, and the machine may be busy
+_ASK_AGAIN = 5.0  # [s]
 _DOMAINS = range(1, 101)  # above that, the ports of DDS fall into those that the system gives away
 
 
@@ -36,7 +38,12 @@ class Graph:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._lock, self.domain = _free_domain()
-        self.environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "ROS_LOG_DIR": str(folder / "log")}
+        self.environment = {
+            **os.environ,
+            "ROS_DOMAIN_ID": str(self.domain),
+            "ROS_LOG_DIR": str(folder / "log"),
+            "PYTHONFAULTHANDLER": "1",
+        }
         self._contexts: list[Context] = []
         self._executors: list[tuple[Executor, threading.Thread]] = []
         self._processes: list[subprocess.Popen[str]] = []
@@ -108,6 +115,24 @@ class Graph:
                 pytest.fail(f"not within {limit:g} s: {what}")
             time.sleep(0.01)
 
+    def ask(self, client: Client, request: Any, whom: str, process: subprocess.Popen[str] | None = None) -> Any:
+        """The answer to ``request``, which may be asked twice: of nodes that have only just met, a request can be lost.
+
+        Where none comes, what ``process`` has said, and where each of its threads is, is the failure's text.
+        """
+        futures = []
+        deadline = time.monotonic() + LIMIT
+        while time.monotonic() < deadline and (process is None or process.poll() is None):
+            futures.append(client.call_async(request))
+            again = min(time.monotonic() + _ASK_AGAIN, deadline)
+            while time.monotonic() < again:
+                answers = [future.result() for future in futures if future.done()]
+                if answers:
+                    return answers[0]
+                time.sleep(0.01)
+        said = self.finish(process, signal.SIGABRT) if process is not None else ""
+        pytest.fail(f"no answer of {whom} within {LIMIT:g} s, asked {len(futures)} times: {said}")
+
     @staticmethod
     def finish(process: subprocess.Popen[str], number: int | None = None, limit: float = LIMIT) -> tuple[int, str, str]:
         """Send signal ``number`` if given, wait for the end: exit status, standard output, standard error."""
@@ -159,9 +184,8 @@ class ModelChange:
         self._graph.until(lambda: self._since, "the plant's report")
         before = self._since[-1]
         value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=str(model_file))
-        future = self._client.call_async(SetParameters.Request(parameters=[Parameter(name="model_file", value=value)]))
-        self._graph.until(future.done, "the plant's answer")
-        assert future.result().results[0].successful
+        request = SetParameters.Request(parameters=[Parameter(name="model_file", value=value)])
+        assert self._graph.ask(self._client, request, "the plant").results[0].successful
         self._graph.until(lambda: self._since[-1] > before, "the time of the change")
         return self._since[-1]
 

@@ -48,11 +48,8 @@ def test_each_starts_answers_and_stops_on_sigint(graph: Graph) -> None:
         # All compile at once what is in no cache yet.
         graph.until(lambda c=client, p=process: c.service_is_ready() or p.poll() is not None, f"{name} is there", limit=120.0)
         assert process.poll() is None, graph.finish(process)
-        future = client.call_async(ListParameters.Request())
-        graph.until(future.done, f"an answer of {name}")
-        result = future.result()
-        assert result is not None
-        assert len(result.result.names) > 3
+        answer = graph.ask(client, ListParameters.Request(), name, process)
+        assert len(answer.result.names) > 3
     for name, process in running.items():
         status, out, error = graph.finish(process, signal.SIGINT)
         assert status == 0, f"{name}: {out}{error}"

@@ -11,11 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from fric_nodes.bagio import read_record
+from fric_nodes.experiment.motion import Drive, Sample
 from fric_nodes.model_file import read_model
+from fric_nodes.nodes.base import LOCK_STEP, LoopNode
 from fric_nodes.nodes.experiment import ExperimentNode
+from fric_nodes.nodes.experiment_drive import ControllerDrive
+from fric_nodes.nodes.forces import STAMPED
 from fric_nodes.nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.pid import PidNode
 from fric_nodes.nodes.plant import PlantNode
+from rcl_interfaces.srv import SetParameters
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -138,6 +143,25 @@ def test_the_gains_of_a_controller_are_set(graph: Graph) -> None:
     assert pid.settings.number("kp") == pytest.approx(runs[-1]["proportional"])
     assert pid.settings.number("ki") == 0.0
     graph.until(lambda: pid.settings.number("force_limit") == 0.0, "the controller is left without force")
+
+
+def test_a_controller_that_is_begun_anew_before_it_answered_is_asked_again(graph: Graph) -> None:
+    gone = Node("pid", context=graph.context())  # served by nobody
+    service = "pid/set_parameters"
+    context = graph.context()
+    asker = LoopNode("asker", (LOCK_STEP, STAMPED), context=context, parameter_overrides=_overrides(stamped=True))
+    graph.owns(asker)
+    client = asker.create_client(SetParameters, service)
+    drive = ControllerDrive(asker, "pid", 1.0, 0.001)
+    graph.until(client.service_is_ready, service)
+    wanted, sample = Drive(proportional=2.0, reference=0.1), Sample(0.0, 0.0, 0.0)
+    assert drive.give(1, wanted, sample) is None
+    gone.destroy_node()
+    graph.until(lambda: not client.service_is_ready(), "it is gone")
+    pid = graph.owns(PidNode(context=context, parameter_overrides=_overrides(lock_step=True, period=H, force_limit=5.0)))
+    graph.spin(pid, asker, kind=LeanExecutor)
+    graph.until(lambda: drive.give(2, wanted, sample) is not None, "the setting is made", 30.0)
+    assert pid.settings.number("kp") == 2.0
 
 
 @pytest.mark.parametrize("lock_step", [True, False])

@@ -8,6 +8,7 @@ controller's limit, which takes effect whatever it remembers.
 from __future__ import annotations
 
 import math
+import time
 from typing import Protocol
 
 from rcl_interfaces.srv import SetParameters
@@ -24,6 +25,11 @@ from .forces import ForcePublisher
 from .qos import SAMPLES
 
 __all__ = ["ControllerDrive", "ForceDrive", "Output"]
+
+# A request or its answer may be lost where the controller is begun anew, or where two nodes have only just met: the parts of a
+# service are matched one by one (https://github.com/ros2/rmw_fastrtps/pull/418). A setting may be asked for twice: one client's
+# requests keep their order.
+_ASK_AGAIN = 1.0  # [s]
 
 
 class Output(Protocol):
@@ -108,6 +114,7 @@ class ControllerDrive:
         self._fixed = {"ki": 0.0, "filter_time": filter_time, "position_weight": 1.0, "velocity_weight": 0.0}
         self._present: dict[str, float] = {}
         self._asked: tuple[dict[str, float], Future] | None = None
+        self._asked_at = 0.0  # [s], monotonic
         self._position = 0.0
 
     def _set(self, wanted: dict[str, float]) -> bool:
@@ -119,6 +126,9 @@ class ControllerDrive:
         if self._asked is not None:
             values, future = self._asked
             if not future.done():
+                if time.monotonic() - self._asked_at > _ASK_AGAIN and self._client.service_is_ready():
+                    self._client.remove_pending_request(future)
+                    self._asked = (values, self._ask(values))
                 return False
             self._asked = None
             for name, result in zip(values, future.result().results, strict=True):
@@ -138,6 +148,7 @@ class ControllerDrive:
     def _ask(self, values: dict[str, float]) -> Future:
         request = SetParameters.Request()
         request.parameters = [Parameter(name, value=float(value)).to_parameter_msg() for name, value in values.items()]
+        self._asked_at = time.monotonic()
         return self._client.call_async(request)
 
     def give(self, stamp: int, drive: Drive, sample: Sample) -> float | None:
