@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.confidence import confidence_of, unknown_confidence
+from fric_nodes.diagnosis.confidence import confidence_of, is_doubtful, unknown_confidence
 from fric_nodes.diagnosis.settle import Step
 
 
@@ -36,3 +36,13 @@ def test_what_is_fainter_than_the_noise_is_hardly_told() -> None:
 def test_nobody_is_ever_certain() -> None:
     assert confidence_of(0.0, came(1.0), 1.0) < 1.0
     assert unknown_confidence(1.0) < 1.0
+
+
+def test_many_that_leave_something_are_believed_only_where_all_are_likely_right() -> None:
+    assert is_doubtful([0.55, 0.46, 0.43], 0.07)
+    assert not is_doubtful([0.9, 0.9, 0.9], 0.07)
+    # What leaves nothing explains it, and two effects are no crowd.
+    assert not is_doubtful([0.55, 0.46, 0.43], 0.02)
+    assert not is_doubtful([0.55, 0.46], 0.07)
+    assert is_doubtful([0.45, 0.45], 0.0)
+    assert is_doubtful([], 0.0)

@@ -10,16 +10,33 @@ truth have other forms, too (``--seed 32 --variant form`` and others); no publis
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from .settle import Step
 
-__all__ = ["AS_LIKELY", "FAINT", "UNEXPLAINED", "confidence_of", "margin_of", "unknown_confidence"]
+__all__ = [
+    "AS_LIKELY",
+    "FAINT",
+    "LITTLE_LEFT",
+    "MANY",
+    "UNEXPLAINED",
+    "confidence_of",
+    "is_doubtful",
+    "margin_of",
+    "unknown_confidence",
+]
 
 AS_LIKELY = 0.5
 """Confidence below which a finding is more likely wrong than right."""
 
 UNEXPLAINED = 0.15
 """Share of what was missing beyond which, where it stays, something unknown remains."""
+
+MANY = 3
+"""Effects at once that still leave something are more likely to have stood in for one."""
+
+LITTLE_LEFT = 0.05
+"""Share of what was missing: with more left by so many, it is looked at what else it could be."""
 
 _OFFSET, _BY_RIVAL, _BY_REST = 1.2, 1.58, -14.1
 _BY_SHARE, _WHOLE = 0.7, 0.2  # of what is missing: what takes more of it doesn't mend another's law
@@ -52,6 +69,21 @@ def confidence_of(rest: float, step: Step, share: float) -> float:
     small = min(math.log(max(share, _LEAST) / _WHOLE), 0.0)
     logit = _OFFSET + _BY_RIVAL * margin_of(step) + _BY_REST * rest + _BY_SHARE * small
     return round(min(1.0 / (1.0 + math.exp(-logit)), _MOST), 4)
+
+
+def is_doubtful(confidences: Sequence[float], rest: float) -> bool:
+    """True where no finding is more likely right than wrong, or where many leave something and not all are likely to be right.
+
+    Several effects together come near to anything. What little they leave is put down to a floor that isn't known well only
+    where they are sure by themselves.
+
+    Args:
+        confidences: of the findings.
+        rest: share of what is missing that they leave.
+    """
+    if len(confidences) >= MANY and rest > LITTLE_LEFT and math.prod(confidences) < AS_LIKELY:
+        return True
+    return all(each < AS_LIKELY for each in confidences)
 
 
 def unknown_confidence(rest: float, stands_out: float = math.inf) -> float:

@@ -26,7 +26,7 @@ from ..threads import linear_algebra_in_one
 from .blocks import one_sided
 from .candidates import FRICTION, Scales, candidates, place_of, scales_of
 from .component import Signature, agreed, signatures
-from .confidence import AS_LIKELY, UNEXPLAINED, confidence_of, unknown_confidence
+from .confidence import LITTLE_LEFT, MANY, UNEXPLAINED, confidence_of, is_doubtful, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, refit
 from .grow import Growth, grow, helped, without_nothings
@@ -72,12 +72,10 @@ _MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
 _KEPT = 0.4  # of what a grown model took off where it was fitted, to be found on the recordings held back
 _FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is missing is known the worse
-_MANY = 3  # effects at once that still leave something are more likely to have stood in for one
 _SHARED = 1.0 / 3.0  # of what is missing: where so many are missed by less altogether, each does the work of the others
 _IN_PART = 0.6  # of what several explain: where they are missed by less, they do each other's work in part, and
 _AS_MUCH = 0.9  # of what they explain is as much
 _FEW = 16  # coefficients, by which a signature is simpler than so many effects
-_SIGNED = 0.05  # with more left, it is looked at whose signature what is missing has
 _HARDLY = 0.6  # with more than this left, something unknown remains however little is known of the floor
 _TWINS = 5
 _AS_FAST = 8  # iterations of a fit by a faster observer
@@ -324,12 +322,12 @@ def _concluded(
     # What needs a mass twice or half as large as the given one is no explanation.
     far_off = mass_off((track.mass, nominal.total_inertia), end) > FAR_OFF
     # What is more likely wrong than right is no explanation either.
-    doubtful = all(each.confidence < AS_LIKELY for each in findings)
+    doubtful = is_doubtful([each.confidence for each in findings], rest)
     plain = growth.unhelped or growth
     beside = growth.beyond > 0.0 or plain is not growth
     # A law that has run to the end of its form stands in for another.
     bent = [term for term in (end.terms[list(end.prefixes).index(step.term)] for step in growth.steps) if strained(term)]
-    if missing and (rest > _SIGNED or doubtful or far_off or beside or bent or len(growth.steps) >= _MANY):
+    if missing and (rest > LITTLE_LEFT or doubtful or far_off or beside or bent or len(growth.steps) >= MANY):
         likely, of_all = _signature_of(searched, plain, max(rest, plain.rest), [each.share for each in findings])
         # Where one signature explains more than several effects do together, these have only stood in for it: a force that
         # swings at one frequency goes with the motion it makes there as a delay, a mode and bristles might.
@@ -351,9 +349,9 @@ def _concluded(
         unexplained = replace(unexplained, where=where)
         if likely is not None and unknown:
             nobody = _unknown(where, likely, growth, scored, unexplained.share, stand_in)
-            # What helps is told all the same; beside something unknown one in ten of such findings was right.
-            found = [replace(each, confidence=min(each.confidence, round(1.0 - nobody.confidence, 4))) for each in findings]
-            findings = [nobody, *sorted(found, key=lambda each: -each.share)]
+            # What helps beside something unknown was right in one of ten cases, however faint that is.
+            most = 1.0 - (unknown_confidence(unexplained.share) if beside else nobody.confidence)
+            findings = [nobody, *_at_most(most, findings)]
     everything = None if alone is None else unexplained.where
     if missing:
         energy = _difference(fast, begin, end)
@@ -385,9 +383,15 @@ def _concluded(
     )
 
 
+def _at_most(confidence: float, findings: Sequence[Finding]) -> list[Finding]:
+    """What helps beside something unknown is told all the same, but with no more than ``confidence``; the largest first."""
+    held = [replace(each, confidence=min(each.confidence, round(confidence, 4))) for each in findings]
+    return sorted(held, key=lambda each: -each.share)
+
+
 def _most_left(growth: Growth) -> float:
     """Share of what is missing that an explanation leaves at most, as well as both are known."""
-    most = UNEXPLAINED if len(growth.steps) < _MANY else _SIGNED
+    most = UNEXPLAINED if len(growth.steps) < MANY else LITTLE_LEFT
     return min(most + _FLOOR_UNSURE * growth.begin.floor / max(growth.begin.excess, 1e-300), _HARDLY)
 
 
@@ -652,7 +656,7 @@ def _signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shares: 
     least = 1.0
     if len(shares) > 1 and sum(shares) < _IN_PART * (1.0 - rest):
         least = _AS_MUCH * (1.0 - rest)
-    if len(shares) >= _MANY and sum(shares) < _SHARED:
+    if len(shares) >= MANY and sum(shares) < _SHARED:
         least = _MOSTLY
     simple = whole.component != FRICTION and whole.share > least and whole.n_coefficients <= _FEW
     if not growth.steps or whole.share > 1.0 - rest or rest > _HARDLY or simple:
