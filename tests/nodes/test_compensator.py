@@ -61,9 +61,7 @@ class Bench:
     def call(self, kind: type[Any], name: str, request: Any) -> Any:
         client = self.node.create_client(kind, name)
         assert client.wait_for_service(10.0)
-        future = client.call_async(request)
-        self.graph.until(future.done, f"an answer of {name}")
-        return future.result()
+        return self.graph.ask(client, request, name)
 
 
 def test_without_a_model_the_force_is_zero_but_comes(graph: Graph) -> None:

@@ -64,9 +64,7 @@ class Listener:
     def call(self, kind: Any, name: str, **request: object) -> Any:
         client = self.node.create_client(kind, f"/identifier/{name}")
         assert client.wait_for_service(timeout_sec=30.0)
-        future = client.call_async(kind.Request(**request))
-        self.graph.until(future.done, f"the answer of ~/{name}")
-        return future.result()
+        return self.graph.ask(client, kind.Request(**request), f"~/{name}")
 
 
 def identifier(graph: Any, **parameters: object) -> IdentifierNode:

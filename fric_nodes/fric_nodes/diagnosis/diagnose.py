@@ -320,7 +320,7 @@ def _concluded(
     findings.sort(key=lambda each: -each.confidence * each.share)
     likely, stand_in = None, False
     # What needs a mass twice or half as large as the given one is no explanation.
-    far_off = mass_off((track.mass, nominal.total_inertia), end) > FAR_OFF
+    far_off = mass_off(track.masses, end) > FAR_OFF
     # What is more likely wrong than right is no explanation either.
     doubtful = is_doubtful([each.confidence for each in findings], rest)
     plain = growth.unhelped or growth

@@ -178,7 +178,7 @@ class Track:
             of the axis there.
         past: what came before each run, if it is a part of one: models that remember for longer are led along it.
         late: part of a sample by which the force acts after its stamps, where its hold isn't known.
-        given: mass that the axis is said to have; 0 where nothing else is said than ``mass`` [F s^2/x].
+        given: mass that the axis is said to have [F s^2/x]; None where nothing else is said than ``mass``.
     """
 
     runs: tuple[Run, ...]
@@ -191,7 +191,7 @@ class Track:
     lead: tuple[int, ...]
     past: tuple[Past | None, ...]
     late: float = 0.0
-    given: float = 0.0
+    given: float | None = None
 
     @classmethod
     def of(cls, records: Sequence[Record], bandwidth: float, model: Model, late: float = 0.0) -> Track:
@@ -250,7 +250,7 @@ class Track:
     @property
     def masses(self) -> tuple[float, ...]:
         """Masses that the axis may well have: that of the model with which the recordings are followed, and the given one."""
-        return (self.mass, self.given) if self.given > 0.0 else (self.mass,)
+        return (self.mass,) if self.given is None else (self.mass, self.given)
 
     @cached_property
     def travel(self) -> float:
