@@ -12,6 +12,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -114,6 +115,23 @@ class Graph:
             if time.monotonic() > deadline:
                 pytest.fail(f"not within {limit:g} s: {what}")
             time.sleep(0.01)
+
+    def meet(self, *nodes: Node) -> None:
+        """Wait until the publishers and subscriptions of ``nodes`` know each other, from both sides.
+
+        Either side may know of the other first; what is published until then is lost without a word.
+        """
+
+        def have_met() -> bool:
+            publishers = [publisher for node in nodes for publisher in node.publishers]
+            subscriptions = [subscription for node in nodes for subscription in node.subscriptions]
+            heard = Counter(each.topic_name for each in publishers)
+            hearing = Counter(each.topic_name for each in subscriptions)
+            return all(each.get_subscription_count() >= hearing[each.topic_name] for each in publishers) and all(
+                each.get_publisher_count() >= heard[each.topic_name] for each in subscriptions
+            )
+
+        self.until(have_met, f"{', '.join(node.get_name() for node in nodes)} have met")
 
     def ask(self, client: Client, request: Any, whom: str, process: subprocess.Popen[str] | None = None) -> Any:
         """The answer to ``request``, which may be asked twice: of nodes that have only just met, a request can be lost.

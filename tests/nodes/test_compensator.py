@@ -42,10 +42,7 @@ class Bench:
         self._references = self.node.create_publisher(Reference, "reference", 1000)
         self.models = self.node.create_publisher(FrictionModel, "friction/model", MODEL)
         graph.spin(self.node)
-        graph.until(
-            lambda: self._references.get_subscription_count() and self.compensator.count_subscribers("feedforward_force"),
-            "a pair",
-        )
+        graph.meet(self.node, self.compensator)
 
     def send(self, n: int, velocity: float = 1.0) -> list[float]:
         """Forces for the next ``n`` references."""

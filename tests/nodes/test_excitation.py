@@ -139,8 +139,7 @@ def test_states_that_cannot_be_used_are_refused_and_counted(graph: Graph) -> Non
     publisher = node.create_publisher(JointState, "joint_states", 100)
     graph.spin(node, kind=LeanExecutor)
     graph.spin(excitation, kind=LeanExecutor)
-    graph.until(lambda: publisher.get_subscription_count() == 1, "the excitation is there")
-    graph.until(lambda: excitation.count_subscribers("force_command") == 1, "and sees who takes its forces")
+    graph.meet(node, excitation)
 
     def send(stamp: int, **fields: object) -> None:
         message = JointState(**{"name": ["axis"], "position": [0.0], **fields})

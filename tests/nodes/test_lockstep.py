@@ -207,7 +207,8 @@ def test_plant_refuses_and_counts_commands_that_are_not_finite(graph: Graph) -> 
     graph.spin(plant)
     tester = graph.node("tester")
     publisher = tester.create_publisher(StampedForce, "force_command", 10)
-    graph.until(lambda: publisher.get_subscription_count() and listener.sample() == 0, "the plant is there")
+    graph.meet(tester, plant)
+    graph.until(lambda: listener.sample() == 0, "the plant is there")
     for force in (float("nan"), float("inf")):
         publisher.publish(StampedForce(force=force))
     graph.until(lambda: plant.counters["refused command"] == 2, "both are refused")
@@ -226,7 +227,7 @@ def test_two_axes_under_their_namespaces_do_not_meet(graph: Graph) -> None:
     graph.spin(*plants)
     tester = graph.node("tester")
     publisher = tester.create_publisher(StampedForce, "left/force_command", 10)
-    graph.until(publisher.get_subscription_count, "the left plant is there")
+    graph.meet(tester, plants[0])
     publisher.publish(StampedForce(force=1.0))
     graph.until(lambda: plants[0].condition()["samples"] == "1", "the left plant moves")
     assert plants[1].condition()["samples"] == "0"

@@ -136,7 +136,8 @@ def test_without_commands_the_force_is_zero_within_the_watchdog_time(graph: Grap
     listener = Listener(graph)
     plant = _make(graph, PlantNode, model_file=_model_file(graph.folder), watchdog_time=0.1, diagnostics_period=0.1)
     graph.spin(plant, kind=LeanExecutor)
-    graph.until(lambda: listener.states and listener.forces.get_subscription_count() > 1, "the plant is there")
+    graph.meet(listener.node, plant)
+    graph.until(lambda: listener.states, "the plant is there")
     listener.forces.publish(Float64(data=3.0))
     graph.until(lambda: plant.counters["watchdog"] == 1, "the watchdog")
     count = len(listener.states)
@@ -154,7 +155,7 @@ def test_commands_that_are_not_finite_are_refused_counted_and_reported(graph: Gr
     listener = Listener(graph)
     plant = _make(graph, PlantNode, model_file=_model_file(graph.folder), diagnostics_period=0.1)
     graph.spin(plant, kind=LeanExecutor)
-    graph.until(lambda: listener.forces.get_subscription_count() > 1, "the plant is there")
+    graph.meet(listener.node, plant)
     for force in (math.nan, math.inf, -math.inf):
         listener.forces.publish(Float64(data=force))
     graph.until(lambda: listener.reports.get("plant", {}).get("refused command") == "3", "three refusals in the report")
@@ -168,8 +169,7 @@ def test_controller_refuses_bad_states_and_stops_with_them(graph: Graph) -> None
     pid = _make(graph, PidNode, **GAINS)
     graph.spin(pid, kind=LeanExecutor)
     states = listener.node.create_publisher(JointState, "joint_states", 100)
-    graph.until(lambda: states.get_subscription_count() > 1, "the controller is there")
-    graph.until(lambda: pid.count_subscribers("force_command") > 0, "and sees who takes its commands")
+    graph.meet(listener.node, pid)
 
     def send(**fields: object) -> None:
         message = JointState(**{"name": ["axis"], "position": [0.0], **fields})
