@@ -36,6 +36,7 @@ _ALIKE = 0.8  # of what the best takes off: another that does tells that the cau
 _TIED = 0.05  # of the floor: no observer tells two that differ by less
 _MUCH = 0.3  # of what is missing: with more left, another observer may see what it is
 _HARDLY = 0.5  # of what is missing: with more left, it is hardly explained
+_FASTER = 0.02  # of what is missing: with more left to a faster observer, it is looked at what that is
 _HELPS = 0.05  # of what is missing, a term has to take off to be told of beside something unknown
 _MOST_HELPING = 7  # terms then, with those that were there
 _TRIED = 0.15  # of the floor: with more left above it, something is fitted in full, whatever it promises at first order
@@ -103,7 +104,27 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
         other = _best_growth(slower, nominal, tell)
         if other.steps and other.rest < min(best.rest, _HARDLY):
             return replace(other, beyond=best.rest)
-    return best
+    return _grown_faster(tracks, best, tell)
+
+
+def _grown_faster(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:
+    """``growth`` and what a faster observer sees beside it, where that explains what it leaves to such a one.
+
+    A slow observer sees a force that swings fast, such as that of a ripple, many times as strong as one that comes and goes.
+    """
+    for track in sorted(tracks, key=lambda each: -each.bandwidth):
+        if track.bandwidth <= growth.track.bandwidth or not growth.steps:
+            break
+        begin, end = (refit(track, state.fit.model) for state in (growth.begin, growth.end))
+        if begin.excess < CLEARLY * begin.floor:
+            continue
+        if end.excess < max(_FASTER * begin.excess, CLEARLY * end.floor):
+            break
+        tell(f"an observer of {track.bandwidth:.3g} rad/s sees {100 * end.excess / begin.excess:.2g} % of it unexplained")
+        seen = replace(growth, track=track, begin=begin, end=end, rest=audit(track, begin.fit.model, end.fit.model))
+        more = _settled(_added([track], seen, None, tell))
+        return more if more.steps and more.rest < _AGAIN and more.price < seen.price else growth
+    return growth
 
 
 def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:
@@ -167,24 +188,37 @@ def _compared(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None
     an axis of another mass hasn't explained it.
     """
     first = _added(tracks, start, None, tell, most=_TO_COMPARE)
-    tried, begun = [first], {step.term.split("#")[0] for step in first.steps[:1]}
+    tried, begun = [(first, _surely_lacks(first))], {step.term.split("#")[0] for step in first.steps[:1]}
+
+    def best_of_all() -> tuple[Growth, float]:
+        return min(tried, key=lambda each: each[1] + each[0].dear)
+
     for other in first.beginnings:
-        best = min(tried, key=lambda each: _lacks(each) + each.dear)
-        lacks = _lacks(best) + implausible(best.track.masses, best.end.fit.model)
+        best, lacks = best_of_all()
+        lacks += implausible(best.track.masses, best.end.fit.model)
         if len(tried) > _OTHER_BEGINNINGS or lacks < (_AGAIN if best.ended else _AGAIN_FOR_MORE):
             break
         if begun & {name.split("#")[0] for name in other.names}:
             continue  # with what it has besides it would come no further than that alone
         begun.add(other.effect.id)
         tell(f"once more, from {' and '.join(other.names)}")
-        tried.append(_added(tracks, start, other, tell, most=_TO_COMPARE))
-    return min(tried, key=lambda each: _lacks(each) + each.dear)
+        grown = _added(tracks, start, other, tell, most=_TO_COMPARE)
+        tried.append((grown, _surely_lacks(grown)))
+    return best_of_all()[0]
 
 
 def _lacks(growth: Growth) -> float:
     """Share of what is missing, on unseen blocks at first order, that the grown model lacks too."""
     begin = refit(growth.track, growth.begin.fit.model, max_iterations=4)
     return growth.end.excess / max(begin.excess, 1e-300)
+
+
+def _surely_lacks(growth: Growth) -> float:
+    """The same, or more where halves of the recordings disagree about what was grown, and it clearly leaves something."""
+    lacks, end = _lacks(growth), growth.end
+    if not growth.steps or not growth.ended or lacks > _AGAIN or end.excess < CLEARLY * end.floor:
+        return lacks
+    return max(lacks, audit(growth.track, growth.begin.fit.model, end.fit.model))
 
 
 def _faint(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth | None:
