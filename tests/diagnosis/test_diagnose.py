@@ -120,6 +120,23 @@ def test_where_twins_stick_and_slip_far_apart_what_is_left_says_which_rival_is_r
 
 
 @pytest.mark.parametrize(
+    ("effects", "seed"),
+    [
+        # An actuator with a knee leaves two hundredths; what it learns from one half of the recordings leaves more in the other.
+        (("dwell_time", "time_drift"), 284139962),
+        # Beside a ripple a slow observer takes the rest for a knee, a faster one sees that it is none.
+        pytest.param(("dwell_time", "ripple"), 118080465, marks=pytest.mark.long),
+    ],
+    ids=["halves disagree", "a faster observer sees more"],
+)
+def test_what_explains_nearly_all_does_not_stand_in_the_way(effects: tuple[str, str], seed: int) -> None:
+    case = draw(seed, "pair", effects)
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert {each.effect for each in found.findings} == set(effects)
+    assert found.unexplained.share < 0.02
+
+
+@pytest.mark.parametrize(
     ("effect", "seed", "name", "true"),
     [
         # A hysteresis explains nearly as much; the fit of a Stribeck curve half as wide and twice as high goes no further.
