@@ -119,20 +119,12 @@ def test_where_twins_stick_and_slip_far_apart_what_is_left_says_which_rival_is_r
     assert {each.effect for each in found.findings} == {"stribeck", "load_dependence"}
 
 
-@pytest.mark.parametrize(
-    ("effects", "seed"),
-    [
-        # An actuator with a knee leaves two hundredths; what it learns from one half of the recordings leaves more in the other.
-        (("dwell_time", "time_drift"), 284139962),
-        # Beside a ripple a slow observer takes the rest for a knee, a faster one sees that it is none.
-        pytest.param(("dwell_time", "ripple"), 118080465, marks=pytest.mark.long),
-    ],
-    ids=["halves disagree", "a faster observer sees more"],
-)
-def test_what_explains_nearly_all_does_not_stand_in_the_way(effects: tuple[str, str], seed: int) -> None:
-    case = draw(seed, "pair", effects)
+@pytest.mark.long
+def test_what_a_slow_observer_does_not_see_is_found_by_a_faster_one() -> None:
+    # Beside a ripple, which a slow observer sees best, it takes what dwell time leaves for a knee of the actuator.
+    case = draw(118080465, "pair", ("dwell_time", "ripple"))
     found = diagnose(case.train, case.validation, case.nominal)
-    assert {each.effect for each in found.findings} == set(effects)
+    assert {each.effect for each in found.findings} == {"dwell_time", "ripple"}
     assert found.unexplained.share < 0.02
 
 
