@@ -81,7 +81,7 @@ def values(estimate: FrictionEstimate) -> dict[str, float]:
 
 def play(graph: Any, bag: Path, **parameters: object) -> None:
     """Play without a pace; the identifier is the only one who listens."""
-    process = graph.start_node("player", bag=bag, rate=0.0, **{"wait_for_subscribers": 1, **parameters})
+    process = graph.start_node("player", bag=bag, rate=0.0, **{"wait_for_subscribers": 1, "pause": 0.01, **parameters})
     assert graph.finish(process)[0] == 0
 
 
