@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
 
-_HOLDS = ("following", "preceding", "linear")
+_HOLDS = ("following", "preceding", "linear", "unknown")
 
 
 class RecordError(InputError):
@@ -54,7 +54,8 @@ class Record:
         units: units of position and force.
         source: the file the record comes from, for messages.
         effort_hold: ``"following"`` when the effort of a sample acts from its stamp to the next, ``"preceding"`` when it acted
-            over the interval that ends at the stamp, ``"linear"`` when it is a sampled continuous signal or nothing is known.
+            over the interval that ends at the stamp, ``"linear"`` when it is a sampled continuous signal, ``"unknown"`` when
+            nobody says so (:func:`fric_nodes.signals.hold.resolved` finds it).
         notes: what was dropped, joined or left out on the way here, and why.
     """
 
@@ -135,6 +136,11 @@ class Record:
         return float(self.time[-1] - self.time[0])
 
     @property
+    def hold(self) -> str:
+        """``effort_hold``, with an unknown one taken as a sampled continuous signal."""
+        return "linear" if self.effort_hold == "unknown" else self.effort_hold
+
+    @property
     def mask(self) -> Mask:
         """True where a sample may be used, shape ``(n_samples,)``."""
         return np.ones(self.n_samples, dtype=np.bool_) if self.valid is None else self.valid
@@ -171,7 +177,9 @@ class Record:
         return self.slice(first, last)
 
     def uniform(self, sample_time: float | None = None) -> Record:
-        """The same signals on an even grid, by linear interpolation; the record itself when it is even already.
+        """The same signals on an even grid; the record itself when it is even already.
+
+        The position goes by a cubic through its neighbours, an effort that is held by its hold, all else by straight lines.
 
         Args:
             sample_time: step of the grid [s]; the median step when None.
@@ -190,10 +198,43 @@ class Record:
             # A grid point is good only when both neighbours are.
             valid = np.interp(grid, self.time, self.valid.astype(np.float64)) > 1 - 1e-9
         changed: dict[str, Any] = {
-            "position": on_grid(self.position),
-            "effort": on_grid(self.effort),
+            "position": _cubic(grid, self.time, self.position),
+            "effort": self._effort_at(grid),
             "velocity": None if self.velocity is None else on_grid(self.velocity),
             "reference": None if self.reference is None else on_grid(self.reference),
             "extra": {name: on_grid(signal) for name, signal in self.extra.items()},
         }
         return replace(self, time=grid, valid=valid, **changed)
+
+    def _effort_at(self, grid: Array) -> Array:
+        """Effort at the times ``grid`` [s], by how it is held."""
+        if self.hold == "linear":
+            return np.asarray(np.interp(grid, self.time, self.effort), dtype=np.float64)
+        # A step of the grid stands for the middle of what it spans.
+        middle = grid + (0.5 if self.hold == "following" else -0.5) * self.sample_time
+        if self.hold == "following":
+            at = np.searchsorted(self.time, middle, side="right") - 1
+        else:
+            at = np.searchsorted(self.time, middle, side="left")
+        return self.effort[np.clip(at, 0, self.n_samples - 1)]
+
+
+def _cubic(grid: Array, time: Array, values: Array) -> Array:
+    """``values`` at the times ``grid``, by the cubic through the four samples around each (Lagrange)."""
+    if time.shape[0] < 4:
+        return np.asarray(np.interp(grid, time, values), dtype=np.float64)
+    first = np.clip(np.searchsorted(time, grid, side="right") - 2, 0, time.shape[0] - 4)
+    around = [first + k for k in range(4)]
+    found = np.zeros(grid.shape[0])
+    for j in range(4):
+        weight = np.ones(grid.shape[0])
+        for k in range(4):
+            if k != j:
+                weight *= (grid - time[around[k]]) / (time[around[j]] - time[around[k]])
+        found += weight * values[around[j]]
+    # Across a gap, or between stamps that nearly coincide, a cubic swings; a straight line doesn't.
+    low, high = time[around[1]], time[around[2]]
+    usual = float(np.median(np.diff(time)))
+    spread = np.min(np.diff(np.array([time[k] for k in around]), axis=0), axis=0)
+    plain = (high - low > 3.0 * usual) | (spread < 0.2 * usual)
+    return np.where(plain, np.interp(grid, time, values), found)

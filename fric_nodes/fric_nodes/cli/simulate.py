@@ -67,7 +67,7 @@ def simulate(
         record.sample_time,
         position=float(record.position[0]),
         velocity=velocity,
-        hold=record.effort_hold,
+        hold=record.hold,
         load=load,
         temperature=temperature,
     )

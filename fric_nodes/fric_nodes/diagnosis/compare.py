@@ -302,11 +302,11 @@ def _correlated(rest: Array) -> float:
 
 def _effort_at(simulated: Record, there: Array, real: Record) -> Array:
     """The simulated effort at the real one's stamps: held ones as they are held."""
-    if simulated.effort_hold == "linear":
+    if simulated.hold == "linear":
         return np.interp(there, simulated.time, simulated.effort)
-    side = "right" if simulated.effort_hold == "following" else "left"
+    side = "right" if simulated.hold == "following" else "left"
     # Half a sample of the real recording to the side on which its effort acts, so that rounding decides nothing.
-    half = 0.5 * real.sample_time * {"following": 1.0, "preceding": -1.0, "linear": 0.0}[real.effort_hold]
+    half = 0.5 * real.sample_time * {"following": 1.0, "preceding": -1.0, "linear": 0.0}[real.hold]
     at = np.searchsorted(simulated.time, there + half, side="right" if side == "right" else "left")
     at = at - 1 if side == "right" else at
     return simulated.effort[np.clip(at, 0, simulated.n_samples - 1)]

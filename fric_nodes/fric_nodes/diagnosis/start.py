@@ -120,7 +120,7 @@ def lateness(train: Sequence[Record], start: Model) -> float:
     Of a controller's output that is held from its stamp to the next it is one half, in a log slower than the controller less.
     It belongs to the instrument: within a sample no recording tells it from a delay of the axis.
     """
-    if start.plant.led or any(record.effort_hold != "linear" for record in train):
+    if start.plant.led or any(record.hold != "linear" for record in train):
         return 0.0
     path = [held.effect for held in start.terms if held.effect.place is Place.COMMAND_PATH]
     if any(p.dimension == "s" for effect in path for p in effect.parameters):

@@ -1,8 +1,8 @@
 """From a recording to the equations of inverse dynamics: filtered motion, matching force, decimated, edges and rest marked.
 
 The position is low-pass filtered without phase (Butterworth, forward and backward) and differentiated; the force passes the
-same filter. Both sides of u = f(q, v, a) are means over the two intervals around a sample: the force according to how the
-recording holds it, the velocity by its central difference, the acceleration by that of a velocity of fourth order. Then both
+same filter. Both sides of u = f(q, v, a) are means about a sample with weights that fall to zero at the next ones: of the
+acceleration that is the second difference of the position, of the force what its hold makes of it. Then both
 pass the same decimation filter, so that no phase and no gain comes between them (the "parallel decimation" of Gautier 1997).
 
 Where the joint sticks, a static law leaves the friction open, and a low-pass carries what it happens to be into the rows
@@ -13,7 +13,7 @@ rows within whose window the joint doesn't rest: at these a static law and its s
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -23,9 +23,11 @@ from scipy.interpolate import CubicSpline
 
 from ..model import Model
 from ..record import Array, Index, Mask, Record, RecordError
+from ..signals.instrument_noise import level_of
+from ..signals.resolution import noise_of
 from .rests import MIN_ROWS, SLOW, Rests, at_rest, can_stand_for, velocity_noise
 from .result import IdentificationError, Options
-from .statistics import noise_of
+from .row_rate import decimation_of
 
 __all__ = ["FINER", "Equations", "Motion", "Stretch", "equations", "nominal_conditions", "surroundings"]
 
@@ -33,10 +35,15 @@ FINER = 4
 """Steps per sample of the motion that friction states are led along."""
 
 _FILTER_ORDER = 4
+_EIGHTH = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)  # of differences k samples apart either way (Fornberg 1988)
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
 _WINDOW_BAND = 0.6  # of the row rate: band of white noise of as much power in the derivative
 _MARGIN = 0.25  # of the cutoff's period: how far the filter on the position carries a rest
-_HIGHEST = 0.36  # of the sampling rate: cutoff where bristles are to be seen and the position is quiet enough
+_HIGHEST = 0.36  # of the sampling rate: above it a filter and differences of samples no longer go together
+_MECHANICS = 100.0  # [Hz], the published choice for positioning axes
+_LEAST_BAND = 10.0  # [Hz]: below it the motion of an axis itself would be filtered away
+_LEAST_SHARE = 0.1  # of the rate, the same for a log that is hardly faster
+_SLOW_LOG = 100.0  # [Hz]
 _QUIET = 2e-4  # noise of the velocity beside its own root mean square
 
 
@@ -75,7 +82,7 @@ class Stretch:
         velocity: [x/s].
         acceleration: [x/s^2].
         effort: force as recorded [F].
-        force: mean force over the two intervals around each sample [F].
+        force: mean force about each sample, as of the motion, see :func:`_differentiated` [F].
         hold: how the recording holds its force.
         load: relative normal load [1], one value or ``(n,)``.
         temperature: [K] from reference, one value or ``(n,)``.
@@ -94,6 +101,11 @@ class Stretch:
     load: Array
     temperature: Array
     smooth: Callable[[Array], Array]
+
+    def along(self, raw_position: Array) -> Stretch:
+        """The same with another position signal [x], shape ``(n,)``."""
+        position, velocity, acceleration = _differentiated(self.smooth(raw_position), self.sample_time)
+        return replace(self, raw_position=raw_position, position=position, velocity=velocity, acceleration=acceleration)
 
     @cached_property
     def motion(self) -> Motion:
@@ -179,9 +191,11 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
     if not stretches:
         raise IdentificationError(
             ", ".join(record.source for record in records),
-            f"no valid part is longer than {(2 * edge + MIN_ROWS * decimation) / rate:.2f} s",
+            f"no valid part is longer than {(2 * edge + MIN_ROWS * (decimation or rate / cutoff)) / rate:.2f} s",
             "record for longer, or raise the cutoff",
         )
+    if decimation is None:
+        decimation = decimation_of(stretches, edge, max(round(rate / cutoff), 1), _thin)
     thin = partial(_thin, edge, decimation)
     force = [thin(stretch, stretch.smooth(stretch.force)) for stretch in stretches]
     velocity = np.concatenate([thin(stretch, stretch.velocity) for stretch in stretches])
@@ -228,11 +242,12 @@ def _even(record: Record, notes: list[str]) -> Record:
     return even
 
 
-def _filter(source: str, records: Sequence[Record], options: Options, rate: float, slips: bool) -> tuple[float, int]:
-    """Cutoff [Hz] and decimation."""
+def _filter(source: str, records: Sequence[Record], options: Options, rate: float, slips: bool) -> tuple[float, int | None]:
+    """Cutoff [Hz], and the decimation where it is given or follows from it."""
     cutoff = options.cutoff
     if cutoff is None:
-        cutoff = min(0.1 * rate, 100.0)
+        cutoff = min(_HIGHEST * rate, _MECHANICS, *(_clear_band(record) for record in records))
+        cutoff = max(cutoff, _LEAST_SHARE * rate if rate < _SLOW_LOG else _LEAST_BAND)
         if slips:
             cutoff = max(cutoff, min(_HIGHEST * rate, *(_quiet_band(record) for record in records)))
     if not 0 < cutoff < 0.5 * rate:
@@ -241,7 +256,17 @@ def _filter(source: str, records: Sequence[Record], options: Options, rate: floa
             f"cutoff of {cutoff:g} Hz for a recording at {rate:.4g} Hz",
             f"choose a cutoff between 0 and {0.5 * rate:.4g} Hz",
         )
-    return cutoff, max(round(rate / cutoff), 1) if options.decimation is None else options.decimation
+    if options.decimation is not None:
+        return cutoff, options.decimation
+    return cutoff, max(round(rate / cutoff), 1) if options.cutoff is not None or slips else None
+
+
+def _clear_band(record: Record) -> float:
+    """Cutoff up to which the speed that the position's errors may show stays below what counts as rest [Hz]."""
+    position = record.position[record.mask]
+    speed = float(np.quantile(np.abs(np.gradient(position, record.sample_time)), 0.98))
+    noise = level_of(position)
+    return float((0.25 * SLOW * speed / (2.0 * np.pi * noise * np.sqrt(2.0 / 3.0 * record.sample_time))) ** (2.0 / 3.0))
 
 
 def _quiet_band(record: Record) -> float:
@@ -288,15 +313,11 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
     sample_time = record.sample_time
     raw = record.position[first:last]
     sos: Any = signal.butter(_FILTER_ORDER, 2.0 * cutoff * sample_time, output="sos")
-    position = signal.sosfiltfilt(sos, raw)
-    velocity = np.gradient(position, sample_time)
-    # Of fourth order: the central difference of a central difference would be lower by another few percent at the cutoff.
-    exact = velocity.copy()
-    exact[2:-2] = (8.0 * (position[3:-1] - position[1:-3]) - (position[4:] - position[:-4])) / (12.0 * sample_time)
+    position, velocity, acceleration = _differentiated(signal.sosfiltfilt(sos, raw), sample_time)
     effort = record.effort[first:last]
     before = np.concatenate([effort[:1], effort[:-1]])
     after = np.concatenate([effort[1:], effort[-1:]])
-    around = {"following": before + effort, "preceding": effort + after, "linear": effort + 0.5 * (before + after)}
+    held = {"following": before + effort, "preceding": effort + after}.get(record.hold)
     load, temperature = surroundings(record)
     return Stretch(
         time=record.time[first:last],
@@ -304,14 +325,42 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
         raw_position=raw,
         position=position,
         velocity=velocity,
-        acceleration=np.gradient(exact, sample_time),
+        acceleration=acceleration,
         effort=effort,
-        force=0.5 * around[record.effort_hold],
-        hold=record.effort_hold,
+        force=smooth_mean(effort) if held is None else 0.5 * held,
+        hold=record.hold,
         load=load[first:last] if load.shape[0] > 1 else load,
         temperature=temperature[first:last] if temperature.shape[0] > 1 else temperature,
         smooth=partial(signal.sosfiltfilt, sos),
     )
+
+
+def _differentiated(position: Array, sample_time: float) -> tuple[Array, Array, Array]:
+    """A filtered position, and its velocity and acceleration as means about each sample, falling to zero at the next ones.
+
+    With these weights the mean acceleration is the second difference of the position, exactly, whatever happens between two
+    samples, and the mean of a force that is held between them is that of the two around a sample. The velocity is taken by
+    differences of eighth order and averaged likewise, which for what is smooth is (v_before + 10 v + v_after) / 12.
+    """
+    n, reach = position.shape[0], len(_EIGHTH)
+    velocity = np.gradient(position, sample_time)
+    velocity[reach:-reach] = (
+        sum(
+            weight * (position[reach + k : n - reach + k] - position[reach - k : n - reach - k])
+            for k, weight in enumerate(_EIGHTH, 1)
+        )
+        / sample_time
+    )
+    acceleration = np.empty(n)
+    acceleration[1:-1] = np.diff(position, 2) / sample_time**2
+    acceleration[0], acceleration[-1] = acceleration[1], acceleration[-2]
+    return position, smooth_mean(velocity), acceleration
+
+
+def smooth_mean(values: Array) -> Array:
+    """Mean of a smooth signal about each sample with weights that fall to zero at the next ones, shape ``(n,)``."""
+    before, after = np.concatenate([values[:1], values[:-1]]), np.concatenate([values[1:], values[-1:]])
+    return np.asarray((before + 10.0 * values + after) / 12.0, dtype=np.float64)
 
 
 def surroundings(record: Record) -> tuple[Array, Array]:

@@ -184,7 +184,7 @@ def harmonics_of(record: Record, frequency: float | None = None) -> Harmonics:
     # Slower than a hundredth of the top speed for longer than a sine is, near its turns.
     resting = float(np.mean(still[first:])) - 2.0 / np.pi * slow / float(np.max(np.abs(velocity)))
     kept = found[first:]
-    if record.effort_hold != "linear":
+    if record.hold != "linear":
         # A force held for a sample has sin(x)/x of its values' harmonic, and the mean of two of them cos(x), x = w h/2.
         kept[:, 0] *= np.tan(0.5 * w * step) / (0.5 * w * step)
     return Harmonics(

@@ -119,16 +119,16 @@ def runs_of(record: Record, late: float | None = None) -> list[Run]:
         found.append(
             Run(
                 step=step,
-                effort=np.ascontiguousarray(_over_intervals(record.effort[first:last], step, record.effort_hold, late)),
+                effort=np.ascontiguousarray(_over_intervals(record.effort[first:last], step, record.hold, late)),
                 position=np.ascontiguousarray(position[1:]),
                 start=(float(position[0]), float((position[1] - position[0]) / step[0])),
                 load=load[first : last - 1] if load.shape[0] > 1 else load,
                 temperature=temperature[first : last - 1] if temperature.shape[0] > 1 else temperature,
                 noise=noise_of(position),
                 effort_noise=noise_of(record.effort[first:last]),
-                hold=record.effort_hold,
+                hold=record.hold,
                 late=late,
-                between=_between(record.effort[first:last], record.effort_hold),
+                between=_between(record.effort[first:last], record.hold),
             )
         )
     return found

@@ -24,6 +24,7 @@ from .conclusion import Fitted, concluded
 from .equations import Equations, equations
 from .filter_bias import residual_of_filters
 from .free_parameters import FreeParameters, candidates
+from .noise_bias import noise_bias, unsure_by
 from .result import Identification, IdentificationError, Method, Options
 from .scoring import driving_force, force_along
 from .statistics import covariance_by_parts
@@ -219,6 +220,11 @@ def fit_force(model: Model, records: Sequence[Record], options: Options) -> Fitt
     covariance = np.full((len(free.names), len(free.names)), np.nan)
     model, known = _without_filter_bias(model, found, free, jacobian, weight)
     covariance[np.ix_(inside, inside)] = covariance_by_parts(jacobian[:, inside], residual - known, weight, found.starts)
+    if not model.has_slip_dynamics:
+        bias = noise_bias(model, found, free, weight, inside)
+        values = model.values
+        values[free.index] = np.clip(values[free.index] - bias, free.lower, free.upper)
+        model, covariance = model.with_values(values), covariance + unsure_by(bias)
     return Fitted(model, free, covariance, found, messages)
 
 

@@ -18,9 +18,9 @@ __all__ = ["at_stamps"]
 
 def at_stamps(record: Record) -> Record:
     """``record`` with the force at the stamps of its samples."""
-    if record.effort_hold == "linear":
+    if record.hold == "linear":
         return record
     effort = record.effort
-    preceding = record.effort_hold == "preceding"
+    preceding = record.hold == "preceding"
     other = np.append(effort[1:], effort[-1]) if preceding else np.insert(effort[:-1], 0, effort[0])
     return replace(record, effort=0.5 * (effort + other), effort_hold="linear")

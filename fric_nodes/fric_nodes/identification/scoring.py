@@ -63,9 +63,11 @@ def force_along(model: Model, stretch: Stretch) -> Array:
     """Force that ``model`` needs along the motion of a stretch at full rate [F], shape ``(n,)``."""
     if not model.has_slip_dynamics:
         return _along(model, stretch.motion)
-    interval = force_over_intervals(model, stretch)
-    around = np.concatenate([interval[:1], interval, interval[-1:]])
-    return np.asarray(0.5 * (around[:-1] + around[1:]), dtype=np.float64)
+    fine = _along(model, stretch.fine_motion).reshape(-1, FINER)
+    # The mean about a sample, falling to zero at the next ones, as of the measured motion.
+    rising = (np.arange(FINER) + 0.5) / FINER
+    before, after = fine @ rising / FINER, fine @ rising[::-1] / FINER
+    return np.concatenate([2.0 * after[:1], before[:-1] + after[1:], 2.0 * before[-1:]])
 
 
 def force_over_intervals(model: Model, stretch: Stretch) -> Array:

@@ -80,7 +80,7 @@ class View:
         """Force at the samples' own instants, as recorded [F], shape ``(n,)``."""
         effort = self.even.effort
         before, after = np.concatenate([effort[:1], effort[:-1]]), np.concatenate([effort[1:], effort[-1:]])
-        other = {"following": before, "preceding": after, "linear": effort}[self.even.effort_hold]
+        other = {"following": before, "preceding": after, "linear": effort}[self.even.hold]
         return np.asarray(0.5 * (effort + other))
 
     @cached_property

@@ -46,7 +46,7 @@ def _free_run(model: Model, part: Record, found: Oscillation) -> Array:
     around = slice(at - near, at + near + 1)
     # Between reversals the motion is smooth: a polynomial says where it is and how fast.
     *_, velocity, position = np.polyfit(found.time[around] - found.time[at], found.position[around], 3).tolist()
-    motion = simulate(model, part.effort, part.sample_time, position=position, velocity=velocity, hold=part.effort_hold)
+    motion = simulate(model, part.effort, part.sample_time, position=position, velocity=velocity, hold=part.hold)
     return motion.position - part.position
 
 

@@ -1,0 +1,178 @@
+"""How a recording holds its force: by how much of a sample the force acts after the stamps that it is recorded with.
+
+A controller's output that is held from its stamp to the next acts, on average, half a sample after its stamp; one that is
+recorded with the state at the end of its interval, or the mean force over that interval, half a sample before it; a measured
+continuous force at its stamp; in a log slower than its controller something in between. So one number tells them apart, the
+lateness tau of the force against the force balance of the sliding axis
+
+    u(t) = m a + k q + b + (F_+ or F_-) sgn v + F_v v + F_2 v |v| + tau du/dt,
+
+to first order in tau. The derivative of the recorded force carries its noise; what the balance explains of it doesn't, and
+serves as its instrument (two-stage least squares), so that tau isn't pulled to zero. Samples around reversals and rests, where
+sgn v isn't known, stay out. Standard errors add the products of instrument and residual up over blocks longer than what is
+correlated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage, signal
+from scipy.interpolate import make_interp_spline
+
+from ..record import Array, Mask, Record
+from .resolution import noise_of, step_of
+
+__all__ = ["Hold", "hold_of", "resolved"]
+
+_ORDER = 4
+_HIGHEST = 0.2  # of the sampling rate: above it a log says little of what acts between its samples
+_JERK_NOISE = 0.03  # of the jerk's rms: what a controller makes of its encoder's noise is then no part of the answer
+_NARROWING = 1.25
+_LOWEST = 1.0  # [Hz]
+_SLIDING = 0.05  # of the high speed
+_REACH = 1.0  # of a cutoff's period, by which a filter smears a reversal to either side
+_BLOCKS = 40
+_FEWEST = 200  # samples
+_NINETY = 1.645  # standard errors
+_KNOWN = 0.25  # of a sample: half of what lies between two ways to hold a force
+_ROUNDS = 3
+_CLASSES = {"following": 0.5, "linear": 0.0, "preceding": -0.5}
+_MEANS = {
+    "following": "held from its stamp to the next",
+    "linear": "a continuous force, sampled",
+    "preceding": "held until its stamp, or a mean over the sample before",
+}
+
+
+@dataclass(frozen=True)
+class Hold:
+    """By how much the force of a recording acts after its stamps.
+
+    Attributes:
+        late: [samples]; NaN where the recording can't tell.
+        error: standard error [samples].
+        sample_time: [s].
+    """
+
+    late: float
+    error: float
+    sample_time: float
+
+    @property
+    def kind(self) -> str:
+        """``following``, ``preceding`` or ``linear`` where only one of them fits; ``between`` or ``unknown`` otherwise."""
+        if not (np.isfinite(self.late) and self.error < _KNOWN):
+            return "unknown"
+        reach = _NINETY * self.error
+        fitting = [name for name, late in _CLASSES.items() if abs(self.late - late) <= max(reach, 0.2 * _KNOWN)]
+        if len(fitting) == 1:
+            return fitting[0]
+        return "between" if not fitting and abs(self.late) < 0.5 else "unknown"
+
+    @property
+    def told(self) -> str:
+        """In one sentence."""
+        if not np.isfinite(self.late):
+            return "how the force is held between samples isn't stated, and the motion can't tell: taken as sampled"
+        measured = (
+            f"it acts {self.late:+.2f} +- {self.error:.2f} samples ({1e3 * self.late * self.sample_time:+.2g} ms) after them"
+        )
+        start = f"how the force is held between its stamps isn't stated; {measured}: "
+        if self.kind in _CLASSES:
+            return f"{start}{_MEANS[self.kind]} (effort_hold: {self.kind})"
+        if self.kind == "between":
+            return f"{start}a log slower than its controller; taken so"
+        if abs(self.late) > 0.5 + _NINETY * self.error:
+            return f"{start}more than any hold explains; a term 'delay' or 'actuator_lag' can take that in"
+        return f"{start}too unsure to tell how it is held; taken as sampled"
+
+
+def _low_pass(values: Array, cutoff: float, h: float) -> Array:
+    sos = signal.butter(_ORDER, min(2.0 * cutoff * h, 0.95), output="sos")
+    return np.asarray(signal.sosfiltfilt(sos, values, padlen=min(values.shape[0] - 1, round(3.0 / (cutoff * h)))))
+
+
+def _cutoff(position: Array, h: float) -> float:
+    """As high as the noise of the position lets the jerk be known, which carries the lateness [Hz]."""
+    noise = max(noise_of(position), step_of(position) / np.sqrt(12.0), 1e-15 * float(np.max(np.abs(position))))
+    cutoff = _HIGHEST / h
+    while cutoff > _LOWEST:
+        smooth = _low_pass(position, cutoff, h)
+        jerk = np.gradient(np.gradient(np.gradient(smooth, h), h), h)
+        # White noise s gives s (2 pi)^3 B^3.5 sqrt(2 h / 7) after a filter to B.
+        if noise * (2.0 * np.pi) ** 3 * cutoff**3.5 * np.sqrt(h * 2.0 / 7.0) <= _JERK_NOISE * float(np.std(jerk)):
+            break
+        cutoff /= _NARROWING
+    return cutoff
+
+
+def _sliding(velocity: Array, valid: Mask, reach: int) -> Mask:
+    """Away from rests, reversals, gaps and ends."""
+    slow = np.abs(velocity) < _SLIDING * float(np.quantile(np.abs(velocity), 0.98))
+    turn = np.concatenate([[False], np.sign(velocity[1:]) != np.sign(velocity[:-1])])
+    bad = slow | turn | ~valid
+    bad[:reach] = bad[-reach:] = True
+    return np.asarray(~ndimage.binary_dilation(bad, iterations=max(reach, 1)), dtype=np.bool_)
+
+
+def hold_of(record: Record) -> Hold:
+    """When the force of ``record`` acts, from its motion alone; the recording on an even grid."""
+    even = record.uniform()
+    h = even.sample_time
+    nothing = Hold(float("nan"), float("inf"), h)
+    if even.n_samples < _FEWEST or float(np.ptp(even.effort)) == 0.0 or float(np.ptp(even.position)) == 0.0:
+        return nothing
+    cutoff = _cutoff(even.position, h)
+    q = _low_pass(even.position, cutoff, h)
+    v = _low_pass(np.asarray(make_interp_spline(even.time, even.position, 3).derivative()(even.time)), cutoff, h)
+    a = np.asarray(make_interp_spline(even.time, v, 3).derivative()(even.time))
+    u = _low_pass(even.effort, cutoff, h)
+    rate = np.asarray(make_interp_spline(even.time, u, 3).derivative()(even.time))
+    use = np.flatnonzero(_sliding(v, even.mask, round(_REACH / (cutoff * h))))
+    if use.size < _FEWEST:
+        return nothing
+    ones = np.ones(even.n_samples)
+    columns = np.column_stack([a, v, v * np.abs(v), q - np.mean(q), ones, np.sign(v)])
+    if np.ptp(np.sign(v[use])) == 0.0:
+        columns = columns[:, :-1]
+    columns = columns / np.maximum(np.sqrt(np.mean(columns[use] ** 2, axis=0)), 1e-300)
+    late = error = 0.0
+    for _ in range(_ROUNDS):
+        # The instrument: the derivative of what the balance makes of the force, late as found so far.
+        theta = np.linalg.lstsq(columns[use], (u - late * rate)[use], rcond=1e-10)[0]
+        made = np.asarray(make_interp_spline(even.time, columns[:, :-1] @ theta[:-1], 3).derivative()(even.time))
+        late, error = _two_stage(columns[use], rate[use], made[use], u[use], use, even.n_samples)
+    return Hold(late / h, error / h, h) if np.isfinite(late) else nothing
+
+
+def _two_stage(columns: Array, rate: Array, made: Array, force: Array, at: Array, n: int) -> tuple[float, float]:
+    """Lateness and its standard error [s]."""
+    basis, _ = np.linalg.qr(columns)
+
+    def apart(values: Array) -> Array:
+        return values - basis @ (basis.T @ values)
+
+    instrument, regressor, target = apart(made), apart(rate), apart(force)
+    power = float(instrument @ regressor)
+    if not power > 0.0:
+        return float("nan"), float("inf")
+    late = float(instrument @ target) / power
+    score = instrument * (target - late * regressor)
+    sums = np.bincount((at * _BLOCKS) // n, weights=score, minlength=_BLOCKS)
+    return late, float(np.sqrt(np.sum(sums**2))) / power
+
+
+def resolved(record: Record) -> Record:
+    """``record`` with its hold found and a note of it, where it states none; otherwise as it is."""
+    if record.effort_hold != "unknown":
+        return record
+    found = hold_of(record)
+    notes = (*record.notes, found.told)
+    if found.kind in _CLASSES:
+        return replace(record, effort_hold=found.kind, notes=notes)
+    if found.kind == "between":
+        moved = make_interp_spline(record.time, record.effort, 3)(record.time - found.late * found.sample_time)
+        return replace(record, effort=np.asarray(moved), effort_hold="linear", notes=notes)
+    return replace(record, effort_hold="linear", notes=notes)

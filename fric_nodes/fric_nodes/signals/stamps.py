@@ -1,0 +1,190 @@
+"""Stamps: the even grid that they stand for, and whether the motion follows the grid or the stamps.
+
+**The grid from the stamps alone.** Sample k is taken at t_0 + P n_k, with whole numbers n_k that grow by one but where samples
+were lost. The period P is the median of slopes over many samples, which neither jitter nor lost samples move. Where a step
+is longer than one and a half periods, the median lateness after it, less that before, tells how many samples were lost:
+a stamp that is late leaves what follows where it was. The line through (n_k, t_k) is the grid.
+
+**Rounded stamps** (single precision, a counter in milliseconds at 400 Hz, too few digits) are the even grid, rounded: each is
+then within one step of the rounding of it. They may repeat, and are recognised before anything asks that time grows.
+
+**Whose the jitter is.** With d_k = stamp - grid and the motion f, the recorded position is
+q_k = f(grid_k) + beta v_k d_k + e_k,
+where beta is 0 if the position was read evenly and only its stamp is late, and 1 if it was read when the stamp was taken.
+Fourth differences D take f away: beta = <D q, D(v d)> / <D(v d), D(v d)>. Where that is surely nearer to one, the stamps
+are right, and the signals are brought onto an even grid by a cubic; else the grid is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from ..record import Array, Mask, Record
+from .resolution import step_of
+
+__all__ = ["Grid", "Jitter", "evened", "grid_of", "jitter_of", "rounded_grid"]
+
+_BASE = 64  # samples over which a slope tells the period
+_LOST = 1.5  # periods: a longer step may have lost a sample
+_BESIDE = 7  # samples on either side that tell where the stamps go on
+_DIFFERENCES = 4
+_EVEN = 1e-3  # of a period: stamps that are evener are left as they are
+_SURE = 1.645  # standard errors: 90 % two-sided
+_HALF = 0.5
+_WANDER = 4.0  # times: by how much a grid that wanders has to follow the stamps better than a straight one does
+_SLOW = 501  # samples over which a clock may wander
+_ROUNDED = 1.5  # steps of the rounding that stamps may lie apart about a line: one, and what the line itself is off
+_MOST_LEVELS = 0.02  # of a period: rounding by less does nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The even grid that stamps stand for.
+
+    Attributes:
+        number: of each sample on the grid, shape ``(n,)``; grows by one but where samples are missing.
+        period: [s].
+        time: of each sample on the grid [s], shape ``(n,)``.
+        off: stamp less grid [s], shape ``(n,)``.
+    """
+
+    number: Array
+    period: float
+    time: Array
+    off: Array
+
+    @property
+    def n_lost(self) -> int:
+        """Samples that are missing."""
+        return int(self.number[-1] - self.number[0]) + 1 - self.number.shape[0]
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the stamps about the grid [s]."""
+        return float(np.std(self.off))
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """What the motion says of stamps that jitter.
+
+    Attributes:
+        share: of the jitter that the motion follows: 0 if the position was read evenly, 1 if at its stamp; NaN: can't be told.
+        error: standard error of it; infinite where it can't be told.
+        noise: standard deviation of the jitter that the chosen stamps still have [s].
+    """
+
+    share: float
+    error: float
+    noise: float
+
+    @property
+    def follows(self) -> bool:
+        """True where the position was read when its stamp was taken."""
+        return self.share - _SURE * self.error > _HALF
+
+
+def _period(time: Array) -> float:
+    base = min(_BASE, max((time.shape[0] - 1) // 2, 1))
+    return float(np.median(time[base:] - time[:-base])) / base
+
+
+def grid_of(time: Array) -> Grid:
+    """The even grid of ``time`` [s], shape ``(n,)``, with n at least 2."""
+    n = time.shape[0]
+    period = _period(time)
+    number = np.arange(n, dtype=np.float64)
+    if period > 0.0:
+        skip = np.ones(n - 1)
+        for k in np.flatnonzero(np.diff(time) > _LOST * period).tolist():
+            before = time[max(k + 1 - _BESIDE, 0) : k + 1]
+            after = time[k + 1 : k + 1 + _BESIDE]
+            left = float(np.median(before + period * np.arange(before.shape[0] - 1, -1, -1)))
+            right = float(np.median(after - period * np.arange(after.shape[0])))
+            skip[k] = max(round((right - left) / period), 1)
+        number[1:] = np.cumsum(skip)
+    slope, start = np.polyfit(number, time, 1)
+    line = slope * number + start
+    off = time - line
+    # A clock that is set right as it goes, or a rate that changes, wanders about any line.
+    slow = median_filter(off, min(_SLOW, 2 * ((n - 1) // 4) + 1), mode="nearest")
+    if float(np.std(off)) > _WANDER * float(np.std(off - slow)) and float(np.ptp(slow)) > _HALF * slope:
+        line, off = line + slow, off - slow
+    return Grid(number, float(slope), line, off)
+
+
+def rounded_grid(time: Array) -> tuple[Array, float] | None:
+    """Even stamps [s], and the step by which the given ones were rounded [s]; None where rounding doesn't explain them.
+
+    Args:
+        time: as recorded [s], shape ``(n,)``; may repeat.
+    """
+    if time.shape[0] < 2 * _BESIDE or not np.all(np.isfinite(time)):
+        return None
+    step = np.diff(time)
+    if np.any(step < 0.0) or not np.any(step > 0.0):
+        return None
+    quantum = step_of(time)
+    grid = grid_of(time)
+    if quantum < _MOST_LEVELS * grid.period or float(np.max(np.abs(step - grid.period))) < _EVEN * grid.period:
+        return None
+    if grid.n_lost or float(np.ptp(grid.off)) > _ROUNDED * quantum or not np.all(np.diff(grid.time) > 0.0):
+        return None
+    return grid.time, quantum
+
+
+def jitter_of(record: Record, grid: Grid) -> Jitter:
+    """Whether the motion of ``record`` follows its stamps or the grid."""
+    nothing = Jitter(float("nan"), float("inf"), grid.spread)
+    if record.n_samples < 10 * _DIFFERENCES or grid.period <= 0.0:
+        return nothing
+    together = _unbroken(grid, record.mask)
+    if int(np.sum(together)) < 10 * _DIFFERENCES:
+        return nothing
+    smooth = _smoothed(record.position)
+    velocity = np.gradient(smooth, grid.period)
+    moved = np.diff(velocity * grid.off, _DIFFERENCES)[together]
+    rest = np.diff(record.position, _DIFFERENCES)[together]
+    power = float(moved @ moved)
+    if power == 0.0:
+        return nothing
+    share = float(moved @ rest) / power
+    left = rest - share * moved
+    score = moved * left
+    # Neighbours share samples: their products are added up over blocks.
+    blocks = np.add.reduceat(score, np.arange(0, score.shape[0], 8 * _DIFFERENCES))
+    error = float(np.sqrt(np.sum(blocks**2))) / power
+    return Jitter(share, error, 0.0)
+
+
+def _unbroken(grid: Grid, valid: Mask) -> Mask:
+    """True for each difference that no gap and no invalid sample reaches into."""
+    whole = np.diff(grid.number) == 1.0
+    width = _DIFFERENCES
+    good = np.lib.stride_tricks.sliding_window_view(whole, width).all(axis=1)
+    marks = np.lib.stride_tricks.sliding_window_view(valid, width + 1).all(axis=1)
+    return np.asarray(good & marks, dtype=np.bool_)
+
+
+def _smoothed(position: Array) -> Array:
+    """Position without its quickest part, over five samples by a parabola (Savitzky and Golay 1964)."""
+    padded = np.concatenate([np.repeat(position[:1], 2), position, np.repeat(position[-1:], 2)])
+    return np.convolve(padded, np.array([-3.0, 12.0, 17.0, 12.0, -3.0]) / 35.0, mode="valid")
+
+
+def evened(record: Record) -> Record:
+    """``record`` with the stamps that its motion has, and a note of it where these aren't the recorded ones."""
+    grid = grid_of(record.time)
+    if grid.period <= 0.0 or float(np.max(np.abs(grid.off))) < _EVEN * grid.period or not np.all(np.diff(grid.time) > 0.0):
+        return record
+    found = jitter_of(record, grid)
+    about = f"stamps jitter by {1e3 * grid.spread:.3g} ms ({100.0 * grid.spread / grid.period:.2g} % of a sample)"
+    if found.follows:
+        note = f"{about}, and the motion follows them: brought onto an even grid of {1.0 / grid.period:.5g} Hz by a cubic"
+        return replace(record.uniform(grid.period), notes=(*record.notes, note))
+    why = "the motion doesn't" if np.isfinite(found.error) and found.error < _HALF else "the motion can't tell"
+    note = f"{about}, {why}: taken as even at {1.0 / grid.period:.5g} Hz; stamp where the sensor is read"
+    return replace(record, time=grid.time - grid.time[0], notes=(*record.notes, note))
