@@ -56,6 +56,7 @@ class Record:
         effort_hold: ``"following"`` when the effort of a sample acts from its stamp to the next, ``"preceding"`` when it acted
             over the interval that ends at the stamp, ``"linear"`` when it is a sampled continuous signal, ``"unknown"`` when
             nobody says so (:func:`fric_nodes.signals.hold.resolved` finds it).
+        timing_error: standard error of when the effort acts relative to its stamps [s]; 0 where that is stated.
         notes: what was dropped, joined or left out on the way here, and why.
     """
 
@@ -71,6 +72,7 @@ class Record:
     units: Units = field(default_factory=Units)
     source: str = "record"
     effort_hold: str = "linear"
+    timing_error: float = 0.0
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

@@ -41,9 +41,7 @@ _WINDOW_BAND = 0.6  # of the row rate: band of white noise of as much power in t
 _MARGIN = 0.25  # of the cutoff's period: how far the filter on the position carries a rest
 _HIGHEST = 0.36  # of the sampling rate: above it a filter and differences of samples no longer go together
 _MECHANICS = 100.0  # [Hz], the published choice for positioning axes
-_LEAST_BAND = 10.0  # [Hz]: below it the motion of an axis itself would be filtered away
-_LEAST_SHARE = 0.1  # of the rate, the same for a log that is hardly faster
-_SLOW_LOG = 100.0  # [Hz]
+_LEAST_BAND = 30.0  # [Hz]: a lower cutoff rounds off the reversals of an axis; noise is averaged away behind it instead
 _QUIET = 2e-4  # noise of the velocity beside its own root mean square
 
 
@@ -84,6 +82,7 @@ class Stretch:
         effort: force as recorded [F].
         force: mean force about each sample, as of the motion, see :func:`_differentiated` [F].
         hold: how the recording holds its force.
+        timing_error: standard error of when the force acts [s].
         load: relative normal load [1], one value or ``(n,)``.
         temperature: [K] from reference, one value or ``(n,)``.
         smooth: the filter that the position went through.
@@ -98,6 +97,7 @@ class Stretch:
     effort: Array
     force: Array
     hold: str
+    timing_error: float
     load: Array
     temperature: Array
     smooth: Callable[[Array], Array]
@@ -247,7 +247,7 @@ def _filter(source: str, records: Sequence[Record], options: Options, rate: floa
     cutoff = options.cutoff
     if cutoff is None:
         cutoff = min(_HIGHEST * rate, _MECHANICS, *(_clear_band(record) for record in records))
-        cutoff = max(cutoff, _LEAST_SHARE * rate if rate < _SLOW_LOG else _LEAST_BAND)
+        cutoff = max(cutoff, min(_LEAST_BAND, _HIGHEST * rate))
         if slips:
             cutoff = max(cutoff, min(_HIGHEST * rate, *(_quiet_band(record) for record in records)))
     if not 0 < cutoff < 0.5 * rate:
@@ -329,6 +329,7 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
         effort=effort,
         force=smooth_mean(effort) if held is None else 0.5 * held,
         hold=record.hold,
+        timing_error=record.timing_error,
         load=load[first:last] if load.shape[0] > 1 else load,
         temperature=temperature[first:last] if temperature.shape[0] > 1 else temperature,
         smooth=partial(signal.sosfiltfilt, sos),

@@ -24,7 +24,7 @@ from .conclusion import Fitted, concluded
 from .equations import Equations, equations
 from .filter_bias import residual_of_filters
 from .free_parameters import FreeParameters, candidates
-from .noise_bias import noise_bias, unsure_by
+from .noise_bias import noise_bias, timing_covariance, unsure_by
 from .result import Identification, IdentificationError, Method, Options
 from .scoring import driving_force, force_along
 from .statistics import covariance_by_parts
@@ -225,6 +225,7 @@ def fit_force(model: Model, records: Sequence[Record], options: Options) -> Fitt
         values = model.values
         values[free.index] = np.clip(values[free.index] - bias, free.lower, free.upper)
         model, covariance = model.with_values(values), covariance + unsure_by(bias)
+    covariance = covariance + timing_covariance(found, jacobian, weight, inside)
     return Fitted(model, free, covariance, found, messages)
 
 

@@ -20,7 +20,7 @@ from .free_parameters import FreeParameters
 from .row_rate import UNSURE
 from .scoring import driving_force, force_along
 
-__all__ = ["noise_bias", "unsure_by"]
+__all__ = ["noise_bias", "timing_covariance", "unsure_by"]
 
 _DRAWS = 2
 _DIFFERENCE = 1e-4
@@ -79,3 +79,28 @@ def _step(model: Model, found: Equations, index: Array, weight: Array) -> Array:
 def unsure_by(bias: Array) -> Array:
     """Covariance that taking ``bias`` off adds, shape ``(n_free, n_free)``."""
     return np.asarray(UNSURE**2 * np.outer(bias, bias))
+
+
+def timing_covariance(found: Equations, jacobian: Array, weight: Array, inside: Mask) -> Array:
+    """Covariance that not knowing when the force acts adds, shape ``(n_free, n_free)``.
+
+    A force that acts later by tau is less by tau times its rate, to first order; each recording has a tau of its own.
+
+    Args:
+        found: the equations.
+        jacobian: derivative of measured minus predicted force, shape ``(n_rows, n_free)``.
+        weight: of each squared residual, shape ``(n_rows,)``.
+        inside: free parameters that lie within their bounds.
+    """
+    errors = np.array([stretch.timing_error for stretch in found.stretches])
+    covariance = np.zeros((jacobian.shape[1], jacobian.shape[1]))
+    if not np.any(errors):
+        return covariance
+    rate = found.rows(lambda s: s.timing_error * np.gradient(s.smooth(s.force), s.sample_time))
+    root = np.sqrt(weight)
+    scaled = root[:, None] * jacobian[:, inside]
+    size = np.linalg.norm(scaled, axis=0)
+    size[size == 0.0] = 1.0
+    moved = np.linalg.lstsq(scaled / size, root * rate, rcond=1e-10)[0] / size
+    covariance[np.ix_(inside, inside)] = np.outer(moved, moved)
+    return covariance

@@ -45,10 +45,19 @@ class Rests:
     def clear(self, limit: float) -> Mask:
         """True for each row within whose window the joint isn't slower than ``limit`` [x/s] for a while."""
         parts = [
-            ~_near(at_rest(velocity, limit, step), self.reach)[self.edge : velocity.shape[0] - self.edge : self.decimation]
+            ~_near(at_rest(velocity, limit, step) | turns(velocity), self.reach)[
+                self.edge : velocity.shape[0] - self.edge : self.decimation
+            ]
             for velocity, step in zip(self.velocity, self.sample_time, strict=True)
         ]
         return np.concatenate(parts)
+
+
+def turns(velocity: Array) -> Mask:
+    """True at the samples on either side of a reversal, shape ``(n,)``."""
+    sign = np.sign(velocity)
+    turned = sign[1:] != sign[:-1]
+    return np.concatenate([turned, [False]]) | np.concatenate([[False], turned])
 
 
 def _near(mask: Mask, reach: int) -> Mask:

@@ -38,6 +38,8 @@ _FEWEST = 200  # samples
 _NINETY = 1.645  # standard errors
 _KNOWN = 0.25  # of a sample: half of what lies between two ways to hold a force
 _ROUNDS = 3
+_USUAL = 0.5  # sample either way: how a force may be held, before anything is measured
+_MOST = 1.0  # sample: stamps of position and force, and a hold, lie no further apart; what does is a delay of the axis
 _CLASSES = {"following": 0.5, "linear": 0.0, "preceding": -0.5}
 _MEANS = {
     "following": "held from its stamp to the next",
@@ -69,7 +71,15 @@ class Hold:
         fitting = [name for name, late in _CLASSES.items() if abs(self.late - late) <= max(reach, 0.2 * _KNOWN)]
         if len(fitting) == 1:
             return fitting[0]
-        return "between" if not fitting and abs(self.late) < 0.5 else "unknown"
+        return "between" if not fitting and abs(self.late) < _MOST else "unknown"
+
+    @property
+    def likely(self) -> tuple[float, float]:
+        """The lateness to go on with, and its standard error [samples]: what was measured, and that holds lie within a half."""
+        if not np.isfinite(self.late) or abs(self.late) > _MOST + _NINETY * self.error:
+            return 0.0, _USUAL
+        weight = _USUAL**2 / (_USUAL**2 + self.error**2)
+        return weight * self.late, self.error * float(np.sqrt(weight))
 
     @property
     def told(self) -> str:
@@ -83,10 +93,10 @@ class Hold:
         if self.kind in _CLASSES:
             return f"{start}{_MEANS[self.kind]} (effort_hold: {self.kind})"
         if self.kind == "between":
-            return f"{start}a log slower than its controller; taken so"
-        if abs(self.late) > 0.5 + _NINETY * self.error:
+            return f"{start}a log slower than its controller, or stamps of another moment; taken so"
+        if abs(self.late) > _MOST:
             return f"{start}more than any hold explains; a term 'delay' or 'actuator_lag' can take that in"
-        return f"{start}too unsure to tell how it is held; taken as sampled"
+        return f"{start}too unsure to tell how it is held; taken as {self.likely[0]:+.2f} +- {self.likely[1]:.2f} samples"
 
 
 def _low_pass(values: Array, cutoff: float, h: float) -> Array:
@@ -144,7 +154,9 @@ def hold_of(record: Record) -> Hold:
         theta = np.linalg.lstsq(columns[use], (u - late * rate)[use], rcond=1e-10)[0]
         made = np.asarray(make_interp_spline(even.time, columns[:, :-1] @ theta[:-1], 3).derivative()(even.time))
         late, error = _two_stage(columns[use], rate[use], made[use], u[use], use, even.n_samples)
-    return Hold(late / h, error / h, h) if np.isfinite(late) else nothing
+        if not np.isfinite(late):
+            return nothing
+    return Hold(late / h, error / h, h)
 
 
 def _two_stage(columns: Array, rate: Array, made: Array, force: Array, at: Array, n: int) -> tuple[float, float]:
@@ -170,9 +182,9 @@ def resolved(record: Record) -> Record:
         return record
     found = hold_of(record)
     notes = (*record.notes, found.told)
+    late, error = found.likely
+    settled = replace(record, timing_error=error * found.sample_time, notes=notes)
     if found.kind in _CLASSES:
-        return replace(record, effort_hold=found.kind, notes=notes)
-    if found.kind == "between":
-        moved = make_interp_spline(record.time, record.effort, 3)(record.time - found.late * found.sample_time)
-        return replace(record, effort=np.asarray(moved), effort_hold="linear", notes=notes)
-    return replace(record, effort_hold="linear", notes=notes)
+        return replace(settled, effort_hold=found.kind)
+    moved = make_interp_spline(record.time, record.effort, 3)(record.time - late * found.sample_time)
+    return replace(settled, effort=np.asarray(moved), effort_hold="linear")

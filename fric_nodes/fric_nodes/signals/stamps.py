@@ -29,7 +29,7 @@ __all__ = ["Grid", "Jitter", "evened", "grid_of", "jitter_of", "rounded_grid"]
 
 _BASE = 64  # samples over which a slope tells the period
 _LOST = 1.5  # periods: a longer step may have lost a sample
-_BESIDE = 7  # samples on either side that tell where the stamps go on
+_BESIDE = (7, 25, 25)  # samples on either side that tell where the stamps go on: few while losses near by are not known yet
 _DIFFERENCES = 4
 _EVEN = 1e-3  # of a period: stamps that are evener are left as they are
 _SURE = 1.645  # standard errors: 90 % two-sided
@@ -37,6 +37,7 @@ _HALF = 0.5
 _WANDER = 4.0  # times: by how much a grid that wanders has to follow the stamps better than a straight one does
 _SLOW = 501  # samples over which a clock may wander
 _ROUNDED = 1.5  # steps of the rounding that stamps may lie apart about a line: one, and what the line itself is off
+_JITTERS = 1.0  # period by which rounded stamps may be late besides: more would change their order
 _MOST_LEVELS = 0.02  # of a period: rounding by less does nothing
 
 
@@ -99,12 +100,14 @@ def grid_of(time: Array) -> Grid:
     number = np.arange(n, dtype=np.float64)
     if period > 0.0:
         skip = np.ones(n - 1)
-        for k in np.flatnonzero(np.diff(time) > _LOST * period).tolist():
-            before = time[max(k + 1 - _BESIDE, 0) : k + 1]
-            after = time[k + 1 : k + 1 + _BESIDE]
-            left = float(np.median(before + period * np.arange(before.shape[0] - 1, -1, -1)))
-            right = float(np.median(after - period * np.arange(after.shape[0])))
-            skip[k] = max(round((right - left) / period), 1)
+        candidates = np.flatnonzero(np.diff(time) > _LOST * period).tolist()
+        for beside in _BESIDE:
+            number[1:] = np.cumsum(skip)
+            late = time - period * number
+            for k in candidates:
+                left = float(np.median(late[max(k + 1 - beside, 0) : k + 1]))
+                right = float(np.median(late[k + 1 : k + 1 + beside]))
+                skip[k] = max(skip[k] + round((right - left) / period), 1)
         number[1:] = np.cumsum(skip)
     slope, start = np.polyfit(number, time, 1)
     line = slope * number + start
@@ -122,7 +125,7 @@ def rounded_grid(time: Array) -> tuple[Array, float] | None:
     Args:
         time: as recorded [s], shape ``(n,)``; may repeat.
     """
-    if time.shape[0] < 2 * _BESIDE or not np.all(np.isfinite(time)):
+    if time.shape[0] < 2 * _BESIDE[0] or not np.all(np.isfinite(time)):
         return None
     step = np.diff(time)
     if np.any(step < 0.0) or not np.any(step > 0.0):
@@ -131,7 +134,7 @@ def rounded_grid(time: Array) -> tuple[Array, float] | None:
     grid = grid_of(time)
     if quantum < _MOST_LEVELS * grid.period or float(np.max(np.abs(step - grid.period))) < _EVEN * grid.period:
         return None
-    if grid.n_lost or float(np.ptp(grid.off)) > _ROUNDED * quantum or not np.all(np.diff(grid.time) > 0.0):
+    if grid.n_lost or float(np.ptp(grid.off)) > _ROUNDED * quantum + _JITTERS * grid.period or not np.all(np.diff(grid.time) > 0.0):
         return None
     return grid.time, quantum
 
