@@ -28,6 +28,7 @@ class Fitted:
         covariance: of their estimates, shape ``(n_free, n_free)``.
         found: the equations of the recordings.
         messages: what had to be said before the fit.
+        timing: part of the covariance that comes from not knowing when the force acts, or None.
     """
 
     model: Model
@@ -35,6 +36,7 @@ class Fitted:
     covariance: Array
     found: Equations
     messages: Sequence[str]
+    timing: Array | None = None
 
 
 def standard_errors(free: FreeParameters, covariance: Array) -> dict[str, float]:

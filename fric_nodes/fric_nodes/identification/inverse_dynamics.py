@@ -225,8 +225,8 @@ def fit_force(model: Model, records: Sequence[Record], options: Options) -> Fitt
         values = model.values
         values[free.index] = np.clip(values[free.index] - bias, free.lower, free.upper)
         model, covariance = model.with_values(values), covariance + unsure_by(bias)
-    covariance = covariance + timing_covariance(found, jacobian, weight, inside)
-    return Fitted(model, free, covariance, found, messages)
+    timing = timing_covariance(found, jacobian, weight, inside)
+    return Fitted(model, free, covariance + timing, found, messages, timing)
 
 
 def filter_residual(model: Model, found: Equations) -> Array:

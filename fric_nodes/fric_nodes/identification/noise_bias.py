@@ -2,8 +2,9 @@
 
 With errors of the same kind added to the recorded position, the fit moves from theta to theta'. To first order in their
 variance the errors that are in the recording have moved it as far already, so that 2 theta - theta' is free of them
-(simulation and extrapolation, Cook and Stefanski 1994, with one step). Each draw is added and subtracted, so that what is odd in it cancels.
-How large the errors are is known to a share only; the same share of what is taken off is added to the uncertainty.
+(simulation and extrapolation, Cook and Stefanski 1994, with one step). Each draw is added and subtracted, so that what is odd
+in it cancels. How large the errors are is known to a share only; the same share of what is taken off is added to the
+uncertainty.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import Model
-from ..record import Array, Mask
+from ..record import Array, Index, Mask
 from ..signals.instrument_noise import errors_like
 from .equations import Equations
 from .free_parameters import FreeParameters
@@ -53,7 +54,7 @@ def _first(model: Model, found: Equations, free: FreeParameters, weight: Array, 
     return step
 
 
-def _step(model: Model, found: Equations, index: Array, weight: Array) -> Array:
+def _step(model: Model, found: Equations, index: Index, weight: Array) -> Array:
     """One Gauss-Newton step of the parameters ``index`` on the rows of ``found``."""
     values = model.values
     target = driving_force(model, found)

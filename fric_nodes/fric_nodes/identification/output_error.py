@@ -27,6 +27,7 @@ from ..errors import InputError
 from ..model import Model
 from ..record import Array, Record
 from . import inverse_dynamics
+from .agreement import reconciled
 from .conclusion import Fitted, concluded, standard_errors
 from .equations import Equations
 from .force_errors import force_errors
@@ -204,7 +205,8 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
         remedy = "start nearer to the machine's values (--model), or shorten the runs (--horizon)"
         trouble = f"not converged after {best.answer.iterations} steps; {remedy}"
     covariance = _covariance(best, free, found, options, known)
-    fitted = Fitted(best.model, free, covariance, found, begun.messages)
+    covariance, doubts = reconciled(best.model, free, covariance, begun)
+    fitted = Fitted(best.model, free, covariance, found, [*begun.messages, *doubts])
     result = concluded(METHOD.id, fitted, records, options, trouble)
     if options.starts <= 1:
         return result

@@ -46,6 +46,7 @@ from ..model import Model
 from ..record import Array, Index, Record
 from ..simulate import substeps
 from . import inverse_dynamics
+from .agreement import reconciled, unsuited
 from .conclusion import Fitted, concluded, standard_errors
 from .equations import Equations
 from .free_parameters import FreeParameters, candidates
@@ -311,7 +312,9 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     covariance = replace(problem, model=model).covariance(starts)
     remedy = "start nearer to the machine's values (--model)"
     trouble = "" if answer.converged else f"not converged after {_MOST_STEPS} steps; {remedy}"
-    return concluded(METHOD.id, Fitted(model, free, covariance, found, begun.messages), records, options, trouble)
+    covariance, doubts = reconciled(model, free, covariance, begun, unsuited(records))
+    fitted = Fitted(model, free, covariance, found, [*begun.messages, *doubts])
+    return concluded(METHOD.id, fitted, records, options, trouble)
 
 
 METHOD = Method(

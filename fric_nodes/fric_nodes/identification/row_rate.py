@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..record import Array
+from ..record import Array, Index
 from ..signals.instrument_noise import errors_like
 from .rests import MIN_ROWS, SLOW
 from .statistics import sandwich_covariance
@@ -70,7 +70,7 @@ def decimation_of(
     return best
 
 
-def _mass_errors(columns: Array, force: Array, noise: Array, starts: Array) -> tuple[float, float]:
+def _mass_errors(columns: Array, force: Array, noise: Array, starts: Index) -> tuple[float, float]:
     """Share by which noise pulls the mass towards zero, and the relative standard error of the mass."""
     others = columns[:, 1:]
     alone = columns[:, 0] - others @ np.linalg.lstsq(others, columns[:, 0], rcond=1e-10)[0]

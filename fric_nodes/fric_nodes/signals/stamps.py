@@ -134,7 +134,11 @@ def rounded_grid(time: Array) -> tuple[Array, float] | None:
     grid = grid_of(time)
     if quantum < _MOST_LEVELS * grid.period or float(np.max(np.abs(step - grid.period))) < _EVEN * grid.period:
         return None
-    if grid.n_lost or float(np.ptp(grid.off)) > _ROUNDED * quantum + _JITTERS * grid.period or not np.all(np.diff(grid.time) > 0.0):
+    if (
+        grid.n_lost
+        or float(np.ptp(grid.off)) > _ROUNDED * quantum + _JITTERS * grid.period
+        or not np.all(np.diff(grid.time) > 0.0)
+    ):
         return None
     return grid.time, quantum
 
