@@ -7,13 +7,13 @@ experiment is four recordings of one pendulum under four position gains.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
 from ..identification import METHODS
-from ..identification.result import Options
+from ..identification.result import Identification, Options
 from ..model import Model, build_model, term
 from ..record import Record, Units
 from ..verification.free_oscillation_reference import INERTIA, PENDULUMS, Pendulum, recorded, swing
@@ -41,16 +41,37 @@ def _structure(inertia: float) -> Model:
     return build_model("rigid", {"mass": inertia}, terms, units=Units("rad", "N m"))
 
 
+def _as_it_is(record: Record) -> Record:
+    return record
+
+
+def _unheard(_: Identification) -> None:
+    pass
+
+
 def _release(pendulum: Pendulum, seed: int, number: int = 0) -> Record:
     """A recording of ``pendulum`` from a deflection of its own."""
     start = float(np.random.default_rng([seed, number, 1]).uniform(1.1, 2.0))
     return recorded(swing(pendulum, start), 10 * seed + number)
 
 
-def free(method: str, seed: int) -> Finding:
-    """One release of one of the four pendulums, fitted by ``method`` with the inertia held."""
+def free(
+    method: str,
+    seed: int,
+    change: Callable[[Record], Record] = _as_it_is,
+    heard: Callable[[Identification], None] = _unheard,
+) -> Finding:
+    """One release of one of the four pendulums, fitted by ``method`` with the inertia held.
+
+    Args:
+        method: id of the method.
+        seed: of the recording.
+        change: made to the recording before it is fitted.
+        heard: is given the result.
+    """
     pendulum = list(PENDULUMS.values())[seed % len(PENDULUMS)]
-    found = METHODS[method].fit(_structure(INERTIA), [_release(pendulum, seed)], Options())
+    found = METHODS[method].fit(_structure(INERTIA), [change(_release(pendulum, seed))], Options())
+    heard(found)
     spring = INERTIA * pendulum.frequency**2
     wet = 2.0 * INERTIA * pendulum.frequency
     truth = {
@@ -73,11 +94,14 @@ def _under_gain(gain: float) -> Pendulum:
     )
 
 
-def parametric(seed: int) -> Finding:
-    """Four releases under four position gains, fitted together; the inertia is free."""
-    records = [_release(_under_gain(gain), seed, number) for number, gain in enumerate(_GAINS)]
+def parametric(
+    seed: int, change: Callable[[Record], Record] = _as_it_is, heard: Callable[[Identification], None] = _unheard
+) -> Finding:
+    """Four releases under four position gains, fitted together; the inertia is free. See :func:`free`."""
+    records = [change(_release(_under_gain(gain), seed, number)) for number, gain in enumerate(_GAINS)]
     options = Options(gains=tuple((gain, 0.0) for gain in _GAINS))
     found = METHODS["parametric-oscillation"].fit(_structure(0.5 * INERTIA), records, options)
+    heard(found)
     truth = {
         "mass": INERTIA,
         "stiffness.stiffness": _STIFFNESS,

@@ -23,10 +23,11 @@ from ..record import Array, Record, Units
 from .benchmark import Benchmark, Figure
 from .trials import SEEDS, Finding, count, figures_of, of_model, over_interval
 
-__all__ = ["BENCHMARK", "TRIALS"]
+__all__ = ["BENCHMARK", "CURVE", "TRIALS", "ladder", "mapped"]
 
 _SPEEDS = np.geomspace(0.002, 0.2, 11)
-_CURVE = {"coulomb.force": 5.0, "viscous.coefficient": 12.0, "bias.force": 0.7}
+CURVE = {"coulomb.force": 5.0, "viscous.coefficient": 12.0, "bias.force": 0.7}
+"""Friction of the ladder: [N], [N s/m], [N]."""
 _SURPLUS = {"stribeck.force": 1.2, "stribeck.velocity": 0.01}
 _RUN_TO_RUN = 0.08  # [N]
 _LEVELS = (2.0, 4.0, 6.0)  # friction under three loads [N]
@@ -48,7 +49,8 @@ def _rounded(values: Array, step: float) -> Array:
     return np.round(values / step) * step
 
 
-def _mapped(records: list[Record], mass: float = 1.0) -> StaticMap:
+def mapped(records: list[Record], mass: float = 1.0) -> StaticMap:
+    """The static map of ``records``."""
     return static_map(start_model(["coulomb"], "axis", Units()).with_value("mass", mass), records, Options())
 
 
@@ -57,14 +59,15 @@ def _by_freedom(found: tuple[float, float], truth: float, freedom: int) -> tuple
     return over_interval(found[0], truth, float(stats.t.ppf(0.95, max(freedom, 1))) * found[1])
 
 
-def _ladder(rng: np.random.Generator, surplus: float) -> list[Record]:
+def ladder(rng: np.random.Generator, surplus: float) -> list[Record]:
+    """Runs at constant velocities in both directions, with ``surplus`` [N] of Stribeck force."""
     records = []
     for velocity in np.concatenate([_SPEEDS, -_SPEEDS]).tolist():
         n = 600
         time: Array = 0.005 * np.arange(n, dtype=np.float64)
         position = velocity * time
-        level = _CURVE["coulomb.force"] + surplus * math.exp(-((velocity / _SURPLUS["stribeck.velocity"]) ** 2))
-        curve = math.copysign(level, velocity) + _CURVE["viscous.coefficient"] * velocity + _CURVE["bias.force"]
+        level = CURVE["coulomb.force"] + surplus * math.exp(-((velocity / _SURPLUS["stribeck.velocity"]) ** 2))
+        curve = math.copysign(level, velocity) + CURVE["viscous.coefficient"] * velocity + CURVE["bias.force"]
         ripple = 0.3 * np.sin(2.0 * np.pi * position / 0.004 + rng.uniform(0.0, 2.0 * np.pi))
         force = curve + ripple + _coloured(rng, n, 0.25) + _RUN_TO_RUN * rng.standard_normal()
         records.append(Record(time, _rounded(position, 1e-6), _rounded(force, 0.01), source=f"{velocity:g}"))
@@ -73,25 +76,25 @@ def _ladder(rng: np.random.Generator, surplus: float) -> list[Record]:
 
 def plain_ladder(seed: int) -> Finding:
     """Coulomb, viscous and bias force from a ladder without Stribeck effect."""
-    return of_model(_mapped(_ladder(np.random.default_rng(seed), 0.0)), _CURVE)
+    return of_model(mapped(ladder(np.random.default_rng(seed), 0.0)), CURVE)
 
 
 def stribeck_ladder(seed: int) -> Finding:
     """A ladder with Stribeck effect; where none is found its parameters count as missed."""
-    found = _mapped(_ladder(np.random.default_rng(seed), _SURPLUS["stribeck.force"]))
+    found = mapped(ladder(np.random.default_rng(seed), _SURPLUS["stribeck.force"]))
     assert found.choice is not None
     if found.choice.best.candidate.stribeck:
-        return of_model(found, _CURVE | _SURPLUS)
-    return dict.fromkeys((*_CURVE, *_SURPLUS), (math.nan, math.nan))
+        return of_model(found, CURVE | _SURPLUS)
+    return dict.fromkeys((*CURVE, *_SURPLUS), (math.nan, math.nan))
 
 
 def ladder_levels(seed: int) -> Finding:
     """The force itself at four speeds, from the curve that was chosen."""
-    found = _mapped(_ladder(np.random.default_rng(seed), _SURPLUS["stribeck.force"]))
+    found = mapped(ladder(np.random.default_rng(seed), _SURPLUS["stribeck.force"]))
     assert found.choice is not None
     at = np.array([0.004, 0.02, 0.06, 0.18])
-    level = _CURVE["coulomb.force"] + _SURPLUS["stribeck.force"] * np.exp(-((at / _SURPLUS["stribeck.velocity"]) ** 2))
-    truth = level + _CURVE["viscous.coefficient"] * at + _CURVE["bias.force"]
+    level = CURVE["coulomb.force"] + _SURPLUS["stribeck.force"] * np.exp(-((at / _SURPLUS["stribeck.velocity"]) ** 2))
+    truth = level + CURVE["viscous.coefficient"] * at + CURVE["bias.force"]
     best = found.choice.best
     rows = zip(at.tolist(), best.force(at).tolist(), truth.tolist(), best.half_width(at, 0.9).tolist(), strict=True)
     return {f"level at {1e3 * v:g} mm/s": over_interval(f, t, w) for v, f, t, w in rows}
@@ -120,7 +123,7 @@ def _strokes(rng: np.random.Generator, level: float, load: float) -> Record:
 def strokes(seed: int) -> Finding:
     """Pre-sliding under three loads: distances, ways to half, rig, friction per load, and what the model takes of it."""
     rng = np.random.default_rng(seed)
-    found = _mapped([_strokes(rng, level, _PER_LOAD * level) for level in _LEVELS])
+    found = mapped([_strokes(rng, level, _PER_LOAD * level) for level in _LEVELS])
     assert found.loads is not None
     assert found.loads.line is not None
     assert found.compliance is not None
@@ -160,7 +163,7 @@ def pressures(seed: int) -> Finding:
     """Friction against pressure, and the area through which it pushes."""
     rng = np.random.default_rng(seed)
     experiments = [_piston(rng, pressure) for pressure in _PRESSURES]
-    found = _mapped([record for record, _ in experiments])
+    found = mapped([record for record, _ in experiments])
     assert found.loads is not None
     assert found.loads.line is not None
     line = found.loads.line
@@ -197,7 +200,7 @@ def _slips(rng: np.random.Generator) -> Record:
 
 def stick_slip(seed: int) -> Finding:
     """Branches over velocity, their difference, and the break-away force."""
-    branch = _mapped([_slips(np.random.default_rng(seed))], _MASS).slips[0]
+    branch = mapped([_slips(np.random.default_rng(seed))], _MASS).slips[0]
     freedom = branch.n - 1
     result = {}
     for k in (2, 7, 11):
@@ -236,7 +239,7 @@ def _starts(rng: np.random.Generator) -> Record:
 
 def starts(seed: int) -> Finding:
     """Break-away forces after rests."""
-    found = _mapped([_starts(np.random.default_rng(seed))])
+    found = mapped([_starts(np.random.default_rng(seed))])
     return {
         f"break-away force {'forward' if each.direction > 0 else 'backward'}": _by_freedom(
             (abs(each.force[0]), each.force[1]), _BREAK_AWAY, each.n - 1

@@ -255,7 +255,7 @@ def recorded(axis: Axis, dirt: Dirt, seed: int, duration: float = 15.0) -> Recor
     keep = logged * h >= lead
     position, force, stamps = positions[logged][keep], force[keep], stamps[keep]
     # What every recording goes through when it is read.
-    found = rounded_grid(stamps)
+    found = rounded_grid(np.asarray(stamps, dtype=np.float64))
     stamps = stamps if found is None else found[0]
     good = np.concatenate([[True], np.diff(stamps) > 0.0])
     record = Record(stamps[good] - stamps[0], position[good], force[good], source=f"dirty axis, seed {seed}")

@@ -2,9 +2,10 @@
 
 Output error and prediction error use what inverse dynamics filters away, which makes them sharper where a recording is what
 they take it for: forces known between the samples, white errors, even stamps. Both kinds estimate the same parameters, so that
-their difference d is, where all holds, no more than the uncertainty C of the less sharp one: d' C^-1 d follows chi-squared
-(Hausman 1978). Where that is exceeded the sharper method's covariance is enlarged by C + d d'; where the recording is known to
-be of another kind, C stands for it. The warning says why.
+their difference d is, where all holds, within the sum C of their uncertainties: d' C^-1 d stays below chi-squared (Hausman
+1978, who takes the difference of both for a method known to be the sharper one). Where that is exceeded the covariance is
+enlarged by d d'; where the recording is known to be of another kind, that of the filtered equations stands for it. The
+warning says why.
 """
 
 from __future__ import annotations
@@ -63,13 +64,15 @@ def reconciled(
         return covariance, []
     off = model.values[free.index] - begun.model.values[begun.free.index[at]]
     part = np.ix_(known, known)
-    size = np.sqrt(np.diag(own)[known])
+    both = own[part] + np.nan_to_num(covariance[part])
+    size = np.sqrt(np.diag(both))
     apart = off[known] / size
-    distance = float(apart @ np.linalg.pinv(own[part] / np.outer(size, size), rcond=1e-6, hermitian=True) @ apart)
+    distance = float(apart @ np.linalg.pinv(both / np.outer(size, size), rcond=1e-6, hermitian=True) @ apart)
     differs = distance > float(chi2.ppf(_LEVEL, known.size))
     if not (differs or reason):
         return covariance, []
-    covariance[part] = own[part] if reason else covariance[part] + own[part]
+    if reason:
+        covariance[part] = own[part]
     if differs:
         covariance[part] += np.outer(off[known], off[known])
     worst = free.names[int(known[np.argmax(np.abs(apart))])]

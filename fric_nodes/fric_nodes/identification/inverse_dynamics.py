@@ -225,7 +225,7 @@ def fit_force(model: Model, records: Sequence[Record], options: Options) -> Fitt
         values = model.values
         values[free.index] = np.clip(values[free.index] - bias, free.lower, free.upper)
         model, covariance = model.with_values(values), covariance + unsure_by(bias)
-    timing = timing_covariance(found, jacobian, weight, inside)
+    timing = timing_covariance(found, jacobian, weight, inside, model.has_command_path)
     return Fitted(model, free, covariance + timing, found, messages, timing)
 
 

@@ -82,7 +82,7 @@ def unsure_by(bias: Array) -> Array:
     return np.asarray(UNSURE**2 * np.outer(bias, bias))
 
 
-def timing_covariance(found: Equations, jacobian: Array, weight: Array, inside: Mask) -> Array:
+def timing_covariance(found: Equations, jacobian: Array, weight: Array, inside: Mask, has_delay: bool) -> Array:
     """Covariance that not knowing when the force acts adds, shape ``(n_free, n_free)``.
 
     A force that acts later by tau is less by tau times its rate, to first order; each recording has a tau of its own.
@@ -92,10 +92,11 @@ def timing_covariance(found: Equations, jacobian: Array, weight: Array, inside: 
         jacobian: derivative of measured minus predicted force, shape ``(n_rows, n_free)``.
         weight: of each squared residual, shape ``(n_rows,)``.
         inside: free parameters that lie within their bounds.
+        has_delay: True where the model's command path takes the time in as a value of its own.
     """
     errors = np.array([stretch.timing_error for stretch in found.stretches])
     covariance = np.zeros((jacobian.shape[1], jacobian.shape[1]))
-    if not np.any(errors):
+    if has_delay or not np.any(errors):
         return covariance
     rate = found.rows(lambda s: s.timing_error * np.gradient(s.smooth(s.force), s.sample_time))
     root = np.sqrt(weight)

@@ -57,7 +57,7 @@ def turns(velocity: Array) -> Mask:
     """True at the samples on either side of a reversal, shape ``(n,)``."""
     sign = np.sign(velocity)
     turned = sign[1:] != sign[:-1]
-    return np.concatenate([turned, [False]]) | np.concatenate([[False], turned])
+    return np.asarray(np.concatenate([turned, [False]]) | np.concatenate([[False], turned]), dtype=np.bool_)
 
 
 def _near(mask: Mask, reach: int) -> Mask:

@@ -21,7 +21,7 @@ import numpy as np
 from scipy import ndimage, signal
 from scipy.interpolate import make_interp_spline
 
-from ..record import Array, Mask, Record
+from ..record import Array, Index, Mask, Record
 from .resolution import noise_of, step_of
 
 __all__ = ["Hold", "hold_of", "resolved"]
@@ -38,8 +38,7 @@ _FEWEST = 200  # samples
 _NINETY = 1.645  # standard errors
 _KNOWN = 0.25  # of a sample: half of what lies between two ways to hold a force
 _ROUNDS = 3
-_USUAL = 0.5  # sample either way: how a force may be held, before anything is measured
-_MOST = 1.0  # sample: stamps of position and force, and a hold, lie no further apart; what does is a delay of the axis
+_MOST = 0.5  # sample either way, by how a force may be held; what is more is a delay
 _CLASSES = {"following": 0.5, "linear": 0.0, "preceding": -0.5}
 _MEANS = {
     "following": "held from its stamp to the next",
@@ -64,21 +63,25 @@ class Hold:
 
     @property
     def kind(self) -> str:
-        """``following``, ``preceding`` or ``linear`` where only one of them fits; ``between`` or ``unknown`` otherwise."""
+        """``following``, ``preceding`` or ``linear`` where only one of them fits; ``between``, ``delayed`` or ``unknown``."""
         if not (np.isfinite(self.late) and self.error < _KNOWN):
             return "unknown"
-        reach = _NINETY * self.error
-        fitting = [name for name, late in _CLASSES.items() if abs(self.late - late) <= max(reach, 0.2 * _KNOWN)]
-        if len(fitting) == 1:
-            return fitting[0]
-        return "between" if not fitting and abs(self.late) < _MOST else "unknown"
+        reach = max(_NINETY * self.error, 0.2 * _KNOWN)
+        fitting = [name for name, late in _CLASSES.items() if abs(self.late - late) <= reach]
+        if fitting:
+            return fitting[0] if len(fitting) == 1 else "unknown"
+        return "between" if abs(self.late) < _MOST else "delayed"
 
     @property
     def likely(self) -> tuple[float, float]:
         """The lateness to go on with, and its standard error [samples]: what was measured, and that holds lie within a half."""
-        if not np.isfinite(self.late) or abs(self.late) > _MOST + _NINETY * self.error:
-            return 0.0, _USUAL
-        weight = _USUAL**2 / (_USUAL**2 + self.error**2)
+        if not np.isfinite(self.late) or (self.kind == "unknown" and abs(self.late) > 2.0 * _MOST + _NINETY * self.error):
+            return 0.0, _MOST
+        if abs(self.late) > _MOST + _NINETY * self.error:
+            # What a hold doesn't explain belongs to the axis: a model without a delay is wrong by it.
+            held = float(np.copysign(_MOST, self.late))
+            return held, float(np.hypot(self.error, self.late - held))
+        weight = _MOST**2 / (_MOST**2 + self.error**2)
         return weight * self.late, self.error * float(np.sqrt(weight))
 
     @property
@@ -86,17 +89,16 @@ class Hold:
         """In one sentence."""
         if not np.isfinite(self.late):
             return "how the force is held between samples isn't stated, and the motion can't tell: taken as sampled"
-        measured = (
-            f"it acts {self.late:+.2f} +- {self.error:.2f} samples ({1e3 * self.late * self.sample_time:+.2g} ms) after them"
-        )
-        start = f"how the force is held between its stamps isn't stated; {measured}: "
+        after = f"{self.late:+.2f} +- {self.error:.2f} samples ({1e3 * self.late * self.sample_time:+.2g} ms) after them"
+        start = f"how the force is held between its stamps isn't stated; it acts {after}: "
+        late, error = self.likely
         if self.kind in _CLASSES:
             return f"{start}{_MEANS[self.kind]} (effort_hold: {self.kind})"
         if self.kind == "between":
-            return f"{start}a log slower than its controller, or stamps of another moment; taken so"
-        if abs(self.late) > _MOST:
-            return f"{start}more than any hold explains; a term 'delay' or 'actuator_lag' can take that in"
-        return f"{start}too unsure to tell how it is held; taken as {self.likely[0]:+.2f} +- {self.likely[1]:.2f} samples"
+            return f"{start}a log slower than its controller; taken so"
+        if self.kind == "delayed":
+            return f"{start}a hold explains {late:+.1f} of it, the rest is a delay; add a term 'delay' or 'actuator_lag'"
+        return f"{start}too unsure to tell how it is held; taken as {late:+.2f} +- {error:.2f} samples"
 
 
 def _low_pass(values: Array, cutoff: float, h: float) -> Array:
@@ -140,7 +142,7 @@ def hold_of(record: Record) -> Hold:
     a = np.asarray(make_interp_spline(even.time, v, 3).derivative()(even.time))
     u = _low_pass(even.effort, cutoff, h)
     rate = np.asarray(make_interp_spline(even.time, u, 3).derivative()(even.time))
-    use = np.flatnonzero(_sliding(v, even.mask, round(_REACH / (cutoff * h))))
+    use: Index = np.flatnonzero(_sliding(v, even.mask, round(_REACH / (cutoff * h)))).astype(np.int64)
     if use.size < _FEWEST:
         return nothing
     ones = np.ones(even.n_samples)
@@ -159,7 +161,7 @@ def hold_of(record: Record) -> Hold:
     return Hold(late / h, error / h, h)
 
 
-def _two_stage(columns: Array, rate: Array, made: Array, force: Array, at: Array, n: int) -> tuple[float, float]:
+def _two_stage(columns: Array, rate: Array, made: Array, force: Array, at: Index, n: int) -> tuple[float, float]:
     """Lateness and its standard error [s]."""
     basis, _ = np.linalg.qr(columns)
 
@@ -184,7 +186,8 @@ def resolved(record: Record) -> Record:
     notes = (*record.notes, found.told)
     late, error = found.likely
     settled = replace(record, timing_error=error * found.sample_time, notes=notes)
-    if found.kind in _CLASSES:
-        return replace(settled, effort_hold=found.kind)
+    kind = {0.5: "following", -0.5: "preceding"}.get(late, "linear") if found.kind == "delayed" else found.kind
+    if kind in _CLASSES:
+        return replace(settled, effort_hold=kind)
     moved = make_interp_spline(record.time, record.effort, 3)(record.time - late * found.sample_time)
     return replace(settled, effort=np.asarray(moved), effort_hold="linear")

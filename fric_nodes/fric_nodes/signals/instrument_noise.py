@@ -34,7 +34,7 @@ def errors_like(position: Array, smooth: Array, random: np.random.Generator) -> 
     """
     step = step_of(position)
     white = math.sqrt(max(noise_of(position) ** 2 - step**2 / 12.0, 0.0))
-    errors = white * random.standard_normal(position.shape[0])
+    errors: Array = random.standard_normal(position.shape) * white
     if step > 0.0:
         moved = smooth + errors + step * random.random()
         errors = errors + step * np.round(moved / step) - moved

@@ -60,7 +60,7 @@ class Grid:
     @property
     def n_lost(self) -> int:
         """Samples that are missing."""
-        return int(self.number[-1] - self.number[0]) + 1 - self.number.shape[0]
+        return int(self.number[-1] - self.number[0] + 1) - int(self.number.shape[0])
 
     @property
     def spread(self) -> float:
@@ -90,7 +90,7 @@ class Jitter:
 
 def _period(time: Array) -> float:
     base = min(_BASE, max((time.shape[0] - 1) // 2, 1))
-    return float(np.median(time[base:] - time[:-base])) / base
+    return float(np.median(time[base:] - time[:-base]) / base)
 
 
 def grid_of(time: Array) -> Grid:
