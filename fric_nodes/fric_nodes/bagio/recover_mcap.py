@@ -9,22 +9,16 @@ from __future__ import annotations
 
 import mmap
 import struct
-import sys
 from binascii import crc32
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 
+from .blocks import UNPACK_ERRORS, unpacked
 from .errors import BagError
 from .topics import Raw, Topic
-
-if sys.version_info >= (3, 14):
-    from compression import zstd
-else:
-    from backports import zstd
 
 __all__ = ["MAGIC", "McapScan", "mcap_metadata"]
 
@@ -51,7 +45,7 @@ def _string(content: bytes, at: int) -> tuple[str, int]:
 
 def _string_map(content: bytes, at: int) -> dict[str, str]:
     (size,) = struct.unpack_from("<I", content, at)
-    at, end = at + 4, at + 4 + size
+    at, end = at + 4, min(at + 4 + size, len(content))
     pairs: dict[str, str] = {}
     while at < end:
         key, at = _string(content, at)
@@ -67,17 +61,6 @@ def _records(content: bytes | mmap.mmap, at: int) -> Iterator[tuple[int, int, in
         start, stop = at + 9, at + 9 + size
         yield opcode, start, min(stop, total), stop <= total
         at = stop
-
-
-def _unpacked(data: bytes, compression: str) -> bytes:
-    """Content of a chunk, or as much of it as its first bytes give."""
-    if compression == "":
-        return data
-    if compression == "zstd":
-        return bytes(zstd.ZstdDecompressor().decompress(data))
-    if compression == "lz4":
-        return bytes(LZ4FrameDecompressor().decompress(data))
-    raise ValueError(f"compression {compression!r} is not known")
 
 
 class McapScan:
@@ -103,6 +86,7 @@ class McapScan:
         with path.open("rb") as file:
             self._content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         if self._content[: len(MAGIC)] != MAGIC:
+            self.close()
             raise BagError(path, "is not an MCAP file (its first bytes are not those of one)", "give a rosbag2 recording")
         counts: dict[int, int] = {}
         for channel, _, _ in self._messages(self.damage):
@@ -146,8 +130,8 @@ class McapScan:
         try:
             size, crc = struct.unpack_from("<QI", content, 16)
             compression, head = _string(content, 28)
-            data = _unpacked(content[head + 8 :], compression)
-        except (struct.error, ValueError, RuntimeError, EOFError, zstd.ZstdError):
+            data = unpacked(content[head + 8 :], compression, size)
+        except (struct.error, *UNPACK_ERRORS):
             damage.append(f"block at byte {at} is not readable and left out")
             return
         if complete and (len(data) != size or (crc and crc32(data) != crc)):
