@@ -183,7 +183,11 @@ class Source:
         for file in files:
             plain = self._unpacked(file) if file.name.endswith(".zstd") else file
             kind = _kind(file)
-            scans = {"mcap": McapScan, "sqlite3": SqliteScan, "ros1": Ros1Scan}
+            scans: dict[str, type[McapScan | SqliteScan | Ros1Scan]] = {
+                "mcap": McapScan,
+                "sqlite3": SqliteScan,
+                "ros1": Ros1Scan,
+            }
             try:
                 scan: McapScan | SqliteScan | Ros1Scan = scans[kind or ""](plain)
             except BagError as error:
