@@ -281,10 +281,11 @@ class _Reading:
             if not times.size:
                 continue
             fields = {name: values[first] for name, values in fields.items()}
-            if role == "reference":
+            if role == "reference" and "velocity" in fields:
                 signals["reference"] = hermite(at, times, fields["position"], fields["velocity"])
             else:
-                signals[role] = np.interp((at - times[0]) * 1e-9, (times - times[0]) * 1e-9, fields["value"])
+                values = fields["position" if role == "reference" else "value"]
+                signals[role] = np.interp((at - times[0]) * 1e-9, (times - times[0]) * 1e-9, values)
 
     def _units(self, given: Units | None) -> Units:
         if given is not None:
@@ -350,12 +351,11 @@ def _namespace(states: Topic, topics: Topics) -> str:
 
 
 def _reference(of: Series) -> Series:
-    """A reference with the fields ``position`` and ``velocity``, from that of a trajectory controller where it is one."""
-    for point in ("reference", "desired"):
-        if f"{point}.position" in of.fields:
-            position = of.fields[f"{point}.position"]
-            velocity = of.fields.get(f"{point}.velocity", np.full(position.size, np.nan))
-            return of._replace(fields={"position": position, "velocity": velocity})
+    """A reference with the field ``position``, and ``velocity`` if it has one; also that of a trajectory controller."""
+    for point in ("reference.", "desired."):
+        if f"{point}position" in of.fields:
+            names = [name for name in ("position", "velocity") if f"{point}{name}" in of.fields]
+            return of._replace(fields={name: of.fields[point + name] for name in names})
     return of
 
 

@@ -26,6 +26,7 @@ MAGIC = b"\x89MCAP0\r\n"
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _METADATA, _DATA_END, _FOOTER = 0x03, 0x04, 0x05, 0x06, 0x0C, 0x0F, 0x02
 _MSG, _IDL = MessageDefinitionFormat.MSG, MessageDefinitionFormat.IDL
 _FORMATS = {"ros2msg": _MSG, "ros2idl": _IDL, "omgidl": _IDL}
+_LATEST = 1 << 63  # [ns] since 1970; times are signed numbers everywhere else
 _UNDEFINED = MessageDefinition(MessageDefinitionFormat.NONE, "")
 
 
@@ -81,6 +82,7 @@ class McapScan:
         self.damage: list[str] = []
         self._channels: dict[int, _Channel] = {}
         self._schemas: dict[int, tuple[str, MessageDefinition]] = {}
+        self._odd = 0  # records that do not hold what they should
         if path.stat().st_size == 0:
             raise BagError(path, "is empty (0 bytes)", "record again")
         with path.open("rb") as file:
@@ -92,6 +94,8 @@ class McapScan:
         for channel, _, _ in self._messages(self.damage):
             counts[channel] = counts.get(channel, 0) + 1
         lost = sum(count for channel, count in counts.items() if channel not in self._channels)
+        if self._odd:
+            self.damage.append(f"{self._odd} records not readable and left out")
         if lost:
             self.damage.append(f"{lost} messages lost: the description of their topic is not readable")
         merged: dict[tuple[str, str], Topic] = {}
@@ -145,6 +149,8 @@ class McapScan:
         try:
             if opcode == _MESSAGE:
                 channel, _, log_time = struct.unpack_from("<HIQ", content)
+                if log_time >= _LATEST or len(content) < 22:
+                    raise struct.error("no time of reception")
                 yield channel, log_time, content[22:]
             elif opcode == _SCHEMA:
                 (number,) = struct.unpack_from("<H", content)
@@ -159,7 +165,7 @@ class McapScan:
                 msgtype, definition = self._schemas.get(schema, ("unknown", _UNDEFINED))
                 self._channels[number] = _Channel(topic, msgtype, definition)
         except struct.error:
-            return  # a record that does not hold what it should is as good as absent
+            self._odd += 1
 
 
 def mcap_metadata(path: Path, name: str) -> dict[str, str]:

@@ -84,6 +84,7 @@ class Ros1Scan:
         self.path = path
         self.damage: list[str] = []
         self._connections: dict[int, tuple[str, str, MessageDefinition]] = {}
+        self._odd = 0  # records that do not hold what they should
         if path.stat().st_size == 0:
             raise BagError(path, "is empty (0 bytes)", "record again")
         with path.open("rb") as file:
@@ -97,6 +98,8 @@ class Ros1Scan:
             self.close()
             raise
         lost = sum(count for number, count in counts.items() if number not in self._connections)
+        if self._odd:
+            self.damage.append(f"{self._odd} records not readable and left out")
         if lost:
             self.damage.append(f"{lost} messages lost: the description of their topic is not readable")
         merged: dict[tuple[str, str], Topic] = {}
@@ -191,4 +194,4 @@ class Ros1Scan:
                 definition = MessageDefinition(MessageDefinitionFormat.MSG, texts[1])
                 self._connections[number] = ("/" + topic.strip("/"), _msgtype(texts[0]), definition)
         except (struct.error, ValueError):
-            return  # a record that does not hold what it should is as good as absent
+            self._odd += 1

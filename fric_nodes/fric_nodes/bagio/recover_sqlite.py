@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from ruamel.yaml.error import YAMLError, YAMLStreamError
 
 from .blocks import UNPACK_ERRORS, unpacked
 from .errors import BagError
@@ -26,6 +26,8 @@ __all__ = ["SqliteScan", "has_journal", "sqlite_metadata"]
 
 _JOURNALS = ("-journal", "-wal", "-shm")
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+# A damaged database may give texts and numbers that Python does not take, even in its own error messages.
+_ERRORS = (sqlite3.Error, ValueError, OverflowError, MemoryError)
 _FORMATS = {"ros2msg": MessageDefinitionFormat.MSG, "ros2idl": MessageDefinitionFormat.IDL}
 
 
@@ -74,7 +76,7 @@ class SqliteScan:
             self._names = self._read_topics()
         except BaseException as error:
             self.close()
-            if isinstance(error, (sqlite3.Error, OverflowError, MemoryError)):
+            if isinstance(error, _ERRORS):
                 raise BagError(
                     path, f"cannot be read as an SQLite bag ({error})", "it is truncated or damaged beyond use: record again"
                 ) from error
@@ -118,7 +120,7 @@ class SqliteScan:
                 str(name): MessageDefinition(_FORMATS.get(encoding, MessageDefinitionFormat.NONE), str(text))
                 for name, encoding, text in self._connection.execute(query)
             }
-        except (sqlite3.Error, OverflowError, MemoryError):
+        except _ERRORS:
             return {}  # bags older than schema version 4 have no such table
 
     def _rows(self, damage: list[str]) -> Iterator[tuple[int, int, bytes]]:
@@ -136,7 +138,7 @@ class SqliteScan:
                     damage.append("read up to the row where there are more of them than the file has room for")
                     break
                 yield number, log_time, data
-        except (sqlite3.Error, OverflowError, MemoryError) as error:
+        except _ERRORS as error:
             damage.append(f"read up to its last readable row ({error})")
         if odd:
             damage.append(f"{odd} rows left out: they hold no message")
@@ -166,7 +168,7 @@ def sqlite_metadata(path: Path) -> dict[str, str]:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)) as connection:
             row = connection.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
         content = YAML(typ="safe").load(row[0]) if row else None
-    except (sqlite3.Error, YAMLError, OverflowError, ValueError, TypeError, AttributeError, MemoryError, RecursionError):
+    except (*_ERRORS, YAMLError, YAMLStreamError, LookupError, TypeError, AttributeError, RecursionError):
         return {}
     custom = content.get("custom_data") if isinstance(content, dict) else None
     return {str(key): str(value) for key, value in custom.items()} if isinstance(custom, dict) else {}

@@ -17,6 +17,7 @@ from types import TracebackType
 
 import apsw
 from rosbags.rosbag2 import Reader, ReaderError
+from ruamel.yaml.error import YAMLError, YAMLStreamError
 
 from .errors import BagError, DamagedError
 from .recover_mcap import McapScan, mcap_metadata
@@ -34,7 +35,8 @@ __all__ = ["Source"]
 _REMEDY = "give a rosbag2 folder, or a .mcap, .db3 or .bag file"
 # What the library lets through when a file is not what it should be. Lengths come from the file: hence the last two.
 _LIBRARY_ERRORS = (ReaderError, OSError, ValueError, LookupError, EOFError, AssertionError, RuntimeError, AttributeError)
-_DAMAGE = (*_LIBRARY_ERRORS, apsw.Error, zstd.ZstdError, TypeError, struct.error, MemoryError, OverflowError)
+_FOREIGN_ERRORS = (apsw.Error, zstd.ZstdError, YAMLError, YAMLStreamError, struct.error)
+_DAMAGE = (*_LIBRARY_ERRORS, *_FOREIGN_ERRORS, TypeError, MemoryError, OverflowError)
 
 
 def _storage_files(folder: Path) -> list[Path]:
@@ -119,6 +121,8 @@ class Source:
             return
         try:
             for connection, log_time, data in self._reader.messages(chosen):
+                if not 0 <= log_time < 1 << 63:
+                    raise ValueError(f"a time of reception of {log_time} ns")
                 yield Raw(connection.topic, connection.msgtype, log_time, data)
         except _DAMAGE as error:
             raise DamagedError(self.path, f"is damaged ({error})", "record again, or restore it from a copy") from error
