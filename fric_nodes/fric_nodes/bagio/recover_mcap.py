@@ -141,9 +141,17 @@ class McapScan:
         if complete and (len(data) != size or (crc and crc32(data) != crc)):
             damage.append(f"block at byte {at} is damaged (checksum or size) and left out")
             return
+        end = 0
         for opcode, start, stop, whole in _records(data, 0):
-            if whole and opcode in {_SCHEMA, _CHANNEL, _MESSAGE}:
+            if not whole:
+                break
+            end = stop
+            if opcode in {_SCHEMA, _CHANNEL, _MESSAGE}:
                 yield from self._record(opcode, data[start:stop])
+            elif opcode < 0x80:
+                self._odd += 1  # nothing else is kept in a block
+        if complete and end < len(data):
+            damage.append(f"block at byte {at} is damaged: the rest of it from byte {end} on is left out")
 
     def _record(self, opcode: int, content: bytes) -> Iterator[tuple[int, int, bytes]]:
         try:

@@ -23,6 +23,7 @@ from .topics import Raw, Topic
 __all__ = ["Ros1Scan"]
 
 _MESSAGE, _BAG_HEADER, _CHUNK, _CONNECTION = 2, 3, 5, 7
+_INDEX = {bytes([4]), bytes([6])}  # operations of records that only say where others are
 _TIME = struct.Struct("<II")
 _LENGTH = struct.Struct("<I")
 
@@ -173,10 +174,16 @@ class Ros1Scan:
         if len(content) != size:
             damage.append(f"block at byte {at} is damaged (size) and left out")
             return
+        end = 0
         for header, start, stop, whole in _records(content, 0):
-            inner = self._header(header, at, damage) if whole else None
+            if not whole:
+                break
+            end = stop
+            inner = self._header(header, at, damage)
             if inner is not None:
                 yield from self._record(inner, inner.get(b"op"), content, start, stop)
+        if end < len(content):
+            damage.append(f"block at byte {at} is damaged: the rest of it from byte {end} on is left out")
 
     def _record(
         self, fields: dict[bytes, bytes], operation: bytes | None, content: bytes | mmap.mmap, start: int, stop: int
@@ -193,5 +200,7 @@ class Ros1Scan:
                 topic = fields.get(b"topic", b"").decode("utf-8", errors="replace")
                 definition = MessageDefinition(MessageDefinitionFormat.MSG, texts[1])
                 self._connections[number] = ("/" + topic.strip("/"), _msgtype(texts[0]), definition)
+            elif operation not in _INDEX:
+                self._odd += 1
         except (struct.error, ValueError):
             self._odd += 1

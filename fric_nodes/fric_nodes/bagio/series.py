@@ -78,6 +78,9 @@ def collect(source: Source, topics: Collection[Topic]) -> dict[str, Messages]:
     for topic in topics:
         log_ns = np.array(times[topic.name], dtype=np.int64)
         messages = data[topic.name]
+        if len(messages) != topic.n_messages and not source.recovered:
+            problem = f"is damaged ({len(messages)} of {topic.n_messages} messages of {topic.name} are where its index says)"
+            raise DamagedError(source.path, problem, "record again, or restore it from a copy")
         if np.any(np.diff(log_ns) < 0):  # several recorder threads, or files out of order
             order = np.argsort(log_ns, kind="stable")
             log_ns, messages = log_ns[order], [messages[index] for index in order]

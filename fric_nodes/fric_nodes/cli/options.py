@@ -74,7 +74,7 @@ class ReadOptions:
         names = {}
         for entry in self.topics:
             role, found, name = entry.partition("=")
-            if not found or not name.strip(":") or role not in Topics.__dataclass_fields__:
+            if not found or not name.partition(":")[0].strip() or role not in Topics.__dataclass_fields__:
                 roles = ", ".join(Topics.__dataclass_fields__)
                 raise InputError("--topic", f"'{entry}' is not ROLE=NAME", f"use a role of {roles}")
             names[role] = name
