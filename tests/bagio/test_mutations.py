@@ -1,8 +1,8 @@
 """Damaged bags: one line, or a record with a word on what is lost; never a traceback, a hang, or memory that they only declare.
 
 Small recordings in every format, and random damage to them: what disks, networks and careless copying do to a file. Ten
-thousand in every run; ``--long`` tries a hundred times as many. What a flipped bit makes of a single number in a message without
-a checksum can't be known, so that values are not compared; that samples are missing can, and has to be said.
+thousand in every run; ``--long`` tries a hundred times as many. What a flipped bit makes of a single number in a message that
+has no checksum can't be known, so that values are not compared; that samples are missing can, and has to be said.
 """
 
 from __future__ import annotations

@@ -115,6 +115,24 @@ def test_a_block_that_declares_too_much_is_left_out(tmp_path: Path) -> None:
     assert len(unpacked(bz2.compress(bytes(10_000_000)), "bz2", 1000)) == 1001
 
 
+def test_messages_of_ros1_in_an_mcap_file(tmp_path: Path) -> None:
+    def text(value: str) -> bytes:
+        return struct.pack("<I", len(value)) + value.encode()
+
+    def record(operation: int, content: bytes) -> bytes:
+        return struct.pack("<BQ", operation, len(content)) + content
+
+    definition, _ = STORE.generate_msgdef(JS, ros_version=1)
+    content = b"\x89MCAP0\r\n" + record(1, text("ros1") + text("a converter"))
+    content += record(3, struct.pack("<H", 1) + text("sensor_msgs/JointState") + text("ros1msg") + text(definition))
+    content += record(4, struct.pack("<HH", 7, 1) + text("/joint_states") + text("ros1") + struct.pack("<I", 0))
+    for _, _, now, data in states():
+        content += record(5, struct.pack("<HIQQ", 7, 0, now, now) + data)
+    content += record(15, bytes(4)) + record(2, bytes(20)) + b"\x89MCAP0\r\n"
+    (tmp_path / "run.mcap").write_bytes(content)
+    np.testing.assert_array_equal(read_record(tmp_path / "run.mcap", joint="joint_b").effort, 3.0 * np.arange(200))
+
+
 def test_another_version_and_another_file(tmp_path: Path) -> None:
     (tmp_path / "old.bag").write_bytes(b"#ROSBAG V1.2\n" + bytes(100))
     with pytest.raises(BagError, match=r"version 1.2; convert it"):

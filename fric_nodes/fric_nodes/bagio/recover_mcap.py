@@ -18,14 +18,14 @@ from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 
 from .blocks import UNPACK_ERRORS, unpacked
 from .errors import BagError
-from .topics import Raw, Topic
+from .topics import Raw, Topic, ros2_name
 
 __all__ = ["MAGIC", "McapScan", "mcap_metadata"]
 
 MAGIC = b"\x89MCAP0\r\n"
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _METADATA, _DATA_END, _FOOTER = 0x03, 0x04, 0x05, 0x06, 0x0C, 0x0F, 0x02
 _MSG, _IDL = MessageDefinitionFormat.MSG, MessageDefinitionFormat.IDL
-_FORMATS = {"ros2msg": _MSG, "ros2idl": _IDL, "omgidl": _IDL}
+_FORMATS = {"ros2msg": _MSG, "ros1msg": _MSG, "ros2idl": _IDL, "omgidl": _IDL}
 _LATEST = 1 << 63  # [ns] since 1970; times are signed numbers everywhere else
 _UNDEFINED = MessageDefinition(MessageDefinitionFormat.NONE, "")
 
@@ -34,6 +34,7 @@ class _Channel(NamedTuple):
     topic: str
     msgtype: str
     definition: MessageDefinition
+    encoding: str
 
 
 def _string(content: bytes, at: int) -> tuple[str, int]:
@@ -102,7 +103,7 @@ class McapScan:
         for number, channel_entry in self._channels.items():
             key = (channel_entry.topic, channel_entry.msgtype)
             before = merged[key].n_messages if key in merged else 0
-            merged[key] = Topic(*key, before + counts.get(number, 0), channel_entry.definition)
+            merged[key] = Topic(*key, before + counts.get(number, 0), channel_entry.definition, channel_entry.encoding)
         self.topics = tuple(merged.values())
 
     def close(self) -> None:
@@ -169,9 +170,12 @@ class McapScan:
                 self._schemas[number] = (name, MessageDefinition(known, text))
             else:
                 number, schema = struct.unpack_from("<HH", content)
-                topic, _ = _string(content, 4)
+                topic, at = _string(content, 4)
+                encoding, _ = _string(content, at)
                 msgtype, definition = self._schemas.get(schema, ("unknown", _UNDEFINED))
-                self._channels[number] = _Channel(topic, msgtype, definition)
+                if encoding == "ros1":
+                    msgtype = ros2_name(msgtype)
+                self._channels[number] = _Channel(topic, msgtype, definition, "ros1" if encoding == "ros1" else "cdr")
         except struct.error:
             self._odd += 1
 

@@ -18,7 +18,7 @@ from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 
 from .blocks import UNPACK_ERRORS, unpacked
 from .errors import BagError
-from .topics import Raw, Topic
+from .topics import Raw, Topic, ros2_name
 
 __all__ = ["Ros1Scan"]
 
@@ -60,12 +60,6 @@ def _records(content: bytes | mmap.mmap, at: int) -> Iterator[tuple[bytes, int, 
         stop = start + size
         yield content[at + 4 : at + 4 + head], start, min(stop, total), stop <= total
         at = stop
-
-
-def _msgtype(name: str) -> str:
-    """Name of a type as ROS 2 writes it."""
-    package, _, rest = name.partition("/")
-    return f"{package}/msg/{rest}" if rest and "/" not in rest else name
 
 
 class Ros1Scan:
@@ -199,7 +193,7 @@ class Ros1Scan:
                 texts = [inner.get(name, b"").decode("utf-8", errors="replace") for name in (b"type", b"message_definition")]
                 topic = fields.get(b"topic", b"").decode("utf-8", errors="replace")
                 definition = MessageDefinition(MessageDefinitionFormat.MSG, texts[1])
-                self._connections[number] = ("/" + topic.strip("/"), _msgtype(texts[0]), definition)
+                self._connections[number] = ("/" + topic.strip("/"), ros2_name(texts[0]), definition)
             elif operation not in _INDEX:
                 self._odd += 1
         except (struct.error, ValueError):

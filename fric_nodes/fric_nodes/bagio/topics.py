@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from rosbags.interfaces import MessageDefinition
 
-__all__ = ["Raw", "Topic", "Topics"]
+__all__ = ["Raw", "Topic", "Topics", "ros2_name"]
 
 
 class Topic(NamedTuple):
@@ -57,3 +57,9 @@ class Topics:
     normal_load: str = "/normal_load"
     temperature: str = "/temperature"
     effort: str = ""
+
+
+def ros2_name(msgtype: str) -> str:
+    """Name of a ROS 1 type as ROS 2 writes it: ``sensor_msgs/JointState`` is ``sensor_msgs/msg/JointState``."""
+    package, _, rest = msgtype.partition("/")
+    return f"{package}/msg/{rest}" if rest and "/" not in rest else msgtype
