@@ -201,12 +201,18 @@ def test_a_wrong_order_is_refused(tmp_path: Path, selection: str, problem: str) 
 
 def test_one_value_for_one_of_several_joints_has_to_be_named(tmp_path: Path) -> None:
     bag = write(tmp_path / "bag", states(["a", "b"]) + commands("/effort_controller/commands", 1))
-    with pytest.raises(BagError, match="does not say that it does") as caught:
-        read_record(bag, joint="a")
-    assert caught.value.remedy.endswith("--topic force_command=/effort_controller/commands")
-    np.testing.assert_array_equal(
-        read_record(bag, joint="a", topics=Topics(force_command="/effort_controller/commands")).effort, RAMP
-    )
+    topic = "/effort_controller/commands"
+    for topics in (Topics(), Topics(force_command=topic)):
+        with pytest.raises(
+            BagError, match="has one value in a message, and nothing says that it is that of joint 'a'"
+        ) as caught:
+            read_record(bag, joint="a", topics=topics)
+        assert f"{topic}:0, {topic}:a" in caught.value.remedy
+    for selection in ("0", "a"):
+        record = read_record(bag, joint="a", topics=Topics(force_command=f"{topic}:{selection}"))
+        np.testing.assert_array_equal(record.effort, RAMP)
+    with pytest.raises(BagError, match="holds the joints a, as was said, and not joint 'b'"):
+        read_record(bag, joint="b", topics=Topics(force_command=f"{topic}:a"))
 
 
 def test_several_controllers_are_listed(tmp_path: Path) -> None:

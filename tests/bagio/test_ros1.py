@@ -76,9 +76,13 @@ def test_commands_of_a_controller(tmp_path: Path) -> None:
         message = STORE.types[F64](data=float(k))
         rows.append(("/joint_b_effort_controller/command", F64, START + k * MS, bytes(STORE.serialize_ros1(message, F64))))
     bag = write(tmp_path / "run.bag", sorted(rows, key=lambda row: row[2]))
-    with pytest.raises(BagError, match=r"--topic force_command=/joint_b_effort_controller/command"):
-        read_record(bag, joint="joint_b")  # of two joints, nothing but its name says whose it is
-    record = read_record(bag, joint="joint_b", topics=Topics(force_command="/joint_b_effort_controller/command"))
+    topic = "/joint_b_effort_controller/command"
+    for topics in (Topics(), Topics(force_command=topic)):
+        with pytest.raises(BagError, match=f"give --topic force_command=NAME with one of {topic}:joint_b"):
+            read_record(bag, joint="joint_b", topics=topics)  # of two joints, nothing but its name says whose it is
+    with pytest.raises(BagError, match="is of joint 'joint_b', as was said, and not of joint 'a'"):
+        read_record(bag, joint="a", topics=Topics(force_command=f"{topic}:joint_b"))
+    record = read_record(bag, joint="joint_b", topics=Topics(force_command=f"{topic}:joint_b"))
     np.testing.assert_array_equal(record.effort, np.arange(200) // 4 * 4.0)
     assert record.effort_hold == "following"
 

@@ -151,7 +151,8 @@ class EffortSearch:
     def _measured(self) -> Effort:
         """A force that was measured on a topic of its own, between its messages on the straight line."""
         _, selection = split_topic(self.topics.effort)
-        other = number_series(self.where, self.raw["effort"], self.states.joint, selection, role="effort", certain=True)
+        single = len(self.states.joints) <= 1
+        other = number_series(self.where, self.raw["effort"], self.states.joint, selection, role="effort", certain=single)
         at, times, order = clocks(self.states, other, self.by_log)
         values = other.fields["value"][order]
         times, first = np.unique(times, return_index=True)
@@ -184,8 +185,7 @@ class EffortSearch:
         single = len(self.states.joints) <= 1
         if _ROLE in self.raw:
             _, selection = split_topic(self.topics.force_command)
-            certain = self._named or single
-            return number_series(self.where, self.raw[_ROLE], joint, selection, role=_ROLE, certain=certain), ""
+            return number_series(self.where, self.raw[_ROLE], joint, selection, role=_ROLE, certain=single), ""
         absent = f"no topic {split_topic(self.topics.force_command)[0]} in the bag"
         refusal = self.refused.get(_ROLE)
         if refusal is not None and not refusal.problem.startswith(absent):
@@ -198,10 +198,10 @@ class EffortSearch:
         if len(self.candidates) != 1:
             raise self._no_command(without)
         ((name, messages),) = self.candidates.items()
-        found = number_series(self.where, messages, joint, "", role=_ROLE, certain=True)
-        if single and _EFFORT_NAME.search(name):
+        found = number_series(self.where, messages, joint, "", role=_ROLE, certain=single)
+        if _EFFORT_NAME.search(name):
             return found, f"there is no topic {self.topics.force_command}, and no other effort command in the bag"
-        unsure = f"{name} may command joint '{joint}', but its name does not say that it does, or that it commands an effort"
+        unsure = f"{name} may command joint '{joint}', but its name does not say that it commands an effort"
         raise BagError(self.where, f"{without}; {unsure}", f"if it does, say so: --topic {_ROLE}={name}")
 
     def _no_command(self, without: str) -> BagError:

@@ -2,10 +2,11 @@
 
 A selection is the index of a value in the message's list (from 0), the joints in the order of the list's values
 (``:shoulder,elbow``), or the dotted name of a field (``:wrench.force.z``, ``:output.effort``), with an index after it where the
-field is a list (``:values.2``). Topic names hold no colon, and a shell leaves it alone.
+field is a list (``:values.2``). Behind a topic of single numbers it names the joint that they are about. Topic names hold no
+colon, and a shell leaves it alone.
 
-Without a selection a number is taken only where there is nothing to choose. Which value of a list belongs to which joint is
-known to the controller's configuration alone, so that nothing is assumed about it.
+Without a selection a number is taken only where there is nothing to choose: a message of one number, in a bag of one joint.
+Which value belongs to which joint is known to the controller's configuration alone, so that nothing is assumed about it.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def select(block: Block, selection: str, joint: str, certain: bool) -> Array | N
         block: decoded messages.
         selection: see above; empty: the only one there is.
         joint: name of the joint.
-        certain: True when a list of a single value can only be about this joint.
+        certain: True when a single value can only be about this joint.
 
     Raises:
         SelectionError: there is no such number, or nothing says which.
@@ -56,13 +57,17 @@ def select(block: Block, selection: str, joint: str, certain: bool) -> Array | N
     scalars = [key for key, values in numbers.items() if values.ndim == 1]
     lists = [key for key, values in numbers.items() if values.ndim == 2]
     if not selection:
-        if len(scalars) == 1 and not lists:
+        if len(scalars) == 1 and not lists and certain:
             return _float(numbers[scalars[0]])
         if len(lists) == 1 and not scalars and numbers[lists[0]].shape[1] == 1 and certain:
             return _float(numbers[lists[0]][:, 0])
         raise SelectionError(_unclear(numbers, scalars, lists, joint), _choices(numbers, scalars, lists, joint))
     if selection in scalars:
         return _float(numbers[selection])
+    if len(scalars) == 1 and not lists:
+        if selection != joint:
+            raise SelectionError(f"is of joint '{selection}', as was said, and not of joint '{joint}'", [joint])
+        return _float(numbers[scalars[0]])
     field, index = _place(numbers, lists, selection, joint)
     return _float(numbers[field][:, index])
 
@@ -92,7 +97,7 @@ def _place(numbers: dict[str, Array], lists: list[str], selection: str, joint: s
         if not selection.isdecimal() and len(order) != numbers[field].shape[1]:
             raise SelectionError(f"has {numbers[field].shape[1]} values, not one for each of {selection}", choices)
         index = int(selection) if selection.isdecimal() else order.index(joint)
-    elif "," in selection and len(lists) == 1:
+    elif len(lists) == 1 and len(order) == numbers[lists[0]].shape[1]:
         raise SelectionError(f"holds the joints {selection}, as was said, and not joint '{joint}'", choices)
     else:
         raise SelectionError(f"has no '{selection}'", choices)
@@ -102,17 +107,20 @@ def _place(numbers: dict[str, Array], lists: list[str], selection: str, joint: s
 
 
 def _unclear(numbers: dict[str, Array], scalars: list[str], lists: list[str], joint: str) -> str:
-    if len(lists) == 1 and not scalars:
-        size = numbers[lists[0]].shape[1]
-        return f"has {size} value{'s' if size != 1 else ''} in a message, and nothing says which is that of joint '{joint}'"
+    if len(lists) + len(scalars) == 1:
+        size = numbers[lists[0]].shape[1] if lists else 1
+        if size == 1:
+            return f"has one value in a message, and nothing says that it is that of joint '{joint}'"
+        return f"has {size} values in a message, and nothing says which is that of joint '{joint}'"
     return "has several numbers in a message" if scalars or lists else "has no number in a message"
 
 
 def _choices(numbers: dict[str, Array], scalars: list[str], lists: list[str], joint: str) -> list[str]:
+    if len(scalars) == 1 and not lists:
+        return [joint]
     if len(lists) == 1 and not scalars:
         size = numbers[lists[0]].shape[1]
-        named = [",".join([joint, *(f"JOINT{k}" for k in range(2, size + 1))])] if size > 1 else []
-        return [*(str(k) for k in range(min(size, _SHOWN - 1))), *named]
+        return [*(str(k) for k in range(min(size, _SHOWN - 1))), ",".join([joint, *(f"JOINT{k}" for k in range(2, size + 1))])]
     return [*scalars, *(f"{key}.{k}" for key in lists for k in range(numbers[key].shape[1]))]
 
 

@@ -131,16 +131,16 @@ def number_series(where: object, messages: Messages, joint: str, selection: str,
         joint: name of the joint.
         selection: which number, see :mod:`.selection`; empty: the only one there is.
         role: of the topic, as it is named on the command line.
-        certain: True when a list of a single value can only be about this joint.
+        certain: True when a single value can only be about this joint; a force whose ``frame_id`` names it is so in any case.
 
     Raises:
         BagError: a message that does not fit its type; no such number; nothing says which.
     """
     topic = messages.topic
-    if not selection and topic.msgtype in (FLOAT64, STAMPED_FORCE):
-        plain = series(where, messages, joint)
-        return plain._replace(fields={"value": next(iter(plain.fields.values()))})
     blocks = _decoded(where, messages)
+    named = [block for block in blocks if block.strings.get("header.frame_id") == joint]
+    if named and topic.msgtype == STAMPED_FORCE:
+        blocks, certain = named, True
     values = np.full(messages.log_ns.size, np.nan)
     has = np.zeros(messages.log_ns.size, dtype=np.bool_)
     for block in blocks:
