@@ -17,8 +17,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ..record import Array, Mask
+from .alignment import clocks, held, stamp_of
 from .checks import MIN_SAMPLES, Stamps, gap_length_ns
-from .clocks import clocks, held, stamp_of
 from .errors import BagError
 from .selection import split_topic
 from .series import Messages, Series, number_series

@@ -17,8 +17,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ..record import Array, Mask, Record, Units
+from .alignment import clocks, hermite, stamp_of
 from .checks import Samples, check_samples, pick_topic
-from .clocks import clocks, hermite, stamp_of
 from .effort import EffortFrom, EffortSearch, command_topics
 from .errors import BagError, DamagedError
 from .selection import split_topic
