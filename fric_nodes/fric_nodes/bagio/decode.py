@@ -8,6 +8,10 @@ Rows where they differ are decoded with a layout of their own.
 
 CDR here is the plain encoding of ROS 2 (OMG DDSI-RTPS, XCDR version 1): four bytes of encapsulation header, whose second byte
 says little (1) or big endian (0), then the fields in order, each aligned to its own size counted from the end of the header.
+Messages of ROS 1 have neither header nor alignment, are little endian, and their strings do not end in a zero.
+
+Lengths come from the file: a list can't have more members than its message has bytes, whatever it says, and types that contain
+themselves are refused.
 """
 
 from __future__ import annotations
@@ -26,6 +30,8 @@ __all__ = ["Block", "DecodeError", "decode", "layout_of"]
 
 _MANY_LAYOUTS = 64  # above this many layouts of one length, messages are decoded one by one
 _HEADER = 4  # bytes of encapsulation before the payload
+_DEEPEST = 32  # levels of types within types; those of ROS have four or five
+_MOST_FIELDS = 100_000  # of a message: above it the table of its fields outgrows the message by far
 _SCALARS = {
     "bool": "u1",
     "byte": "u1",
@@ -65,8 +71,8 @@ class _Layout:
 
     columns: dict[str, _Column] = field(default_factory=dict)
     strings: dict[str, Any] = field(default_factory=dict)
-    fixed: list[tuple[int, int]] = field(default_factory=lambda: [(0, 2)])
-    end: int = _HEADER
+    fixed: list[tuple[int, int]] = field(default_factory=list)
+    end: int = 0
 
 
 class Block(NamedTuple):
@@ -86,17 +92,24 @@ class Block(NamedTuple):
 class _Walker:
     """Finds the offsets of all fields of one message."""
 
-    def __init__(self, message: bytes, types: Typesdict) -> None:
-        if len(message) < _HEADER or message[0] != 0 or message[1] not in {0, 1}:
-            raise DecodeError(f"not plain CDR (it starts with {bytes(message[:4]).hex() or 'nothing'})")
+    def __init__(self, message: bytes, types: Typesdict, ros1: bool) -> None:
         self.message = message
         self.types = types
-        self.order = "<" if message[1] else ">"
+        self.aligned = not ros1
+        self.order = "<"
         self.layout = _Layout()
+        self.depth = 0
+        if ros1:
+            return
+        if len(message) < _HEADER or message[0] != 0 or message[1] not in {0, 1}:
+            raise DecodeError(f"not plain CDR (it starts with {bytes(message[:4]).hex() or 'nothing'})")
+        self.order = "<" if message[1] else ">"
+        self.layout.fixed.append((0, 2))
+        self.layout.end = _HEADER
 
     def take(self, size: int, alignment: int) -> int:
         """Advance over ``size`` bytes aligned to ``alignment``; their offset."""
-        at = self.layout.end + (_HEADER - self.layout.end) % alignment
+        at = self.layout.end + ((_HEADER - self.layout.end) % alignment if self.aligned else 0)
         if at + size > len(self.message):
             raise DecodeError(f"it ends after {len(self.message)} bytes, before all its fields")
         self.layout.end = at + size
@@ -106,7 +119,10 @@ class _Walker:
         """Read a list or string length."""
         at = self.take(4, 4)
         self.layout.fixed.append((at, at + 4))
-        return int(struct.unpack_from(self.order + "I", self.message, at)[0])
+        count = int(struct.unpack_from(self.order + "I", self.message, at)[0])
+        if count > len(self.message):
+            raise DecodeError(f"it ends after {len(self.message)} bytes, before all {count} members of a list")
+        return count
 
     def string(self) -> str:
         size = self.length()
@@ -128,8 +144,12 @@ class _Walker:
     def structure(self, msgtype: str, prefix: str) -> None:
         if msgtype not in self.types:
             raise DecodeError(f"message type {msgtype} is not defined")
+        if self.depth >= _DEEPEST or len(self.layout.columns) > _MOST_FIELDS:
+            raise DecodeError(f"message type {msgtype} contains itself, or too many others")
+        self.depth += 1
         for name, description in self.types[msgtype][1]:
             self.one(prefix + name, description)
+        self.depth -= 1
 
     def one(self, name: str, description: Any) -> None:
         """A field as rosbags describes it."""
@@ -144,20 +164,28 @@ class _Walker:
             if inner == Nodetype.BASE:
                 self.values(name, base[0], count)
             else:
+                if count > len(self.message):
+                    raise DecodeError(f"it ends after {len(self.message)} bytes, before all {count} members of '{name}'")
                 for index in range(count):
                     self.structure(base, f"{name}.{index}.")
 
 
-def layout_of(message: bytes, msgtype: str, types: Typesdict) -> _Layout:
+def layout_of(message: bytes, msgtype: str, types: Typesdict, encoding: str = "cdr") -> _Layout:
     """Where the fields of ``message`` lie.
+
+    Args:
+        message: as recorded.
+        msgtype: its type.
+        types: fields of that type and of those it refers to.
+        encoding: ``cdr`` or ``ros1``.
 
     Raises:
         DecodeError: the message doesn't fit its type.
     """
-    walker = _Walker(message, types)
+    walker = _Walker(message, types, encoding == "ros1")
     walker.structure(msgtype, "")
-    # Up to three bytes of padding may follow; more means that the type is not the one that was written.
-    if len(message) - walker.layout.end > 3:
+    # Up to three bytes of padding may follow in CDR; more means that the type is not the one that was written.
+    if len(message) - walker.layout.end > (3 if walker.aligned else 0):
         raise DecodeError(f"it has {len(message) - walker.layout.end} bytes more than its fields")
     return walker.layout
 
@@ -172,13 +200,14 @@ def _columns(table: NDArray[np.uint8], layout: _Layout) -> dict[str, NDArray[Any
     return numbers
 
 
-def decode(messages: Sequence[bytes], msgtype: str, types: Typesdict) -> list[Block]:
+def decode(messages: Sequence[bytes], msgtype: str, types: Typesdict, encoding: str = "cdr") -> list[Block]:
     """Decode messages of one type.
 
     Args:
-        messages: CDR messages as recorded.
+        messages: as recorded.
         msgtype: their type, such as ``sensor_msgs/msg/JointState``.
         types: fields of that type and of those it refers to, see :func:`fric_nodes.bagio.types.type_fields`.
+        encoding: ``cdr`` or ``ros1``.
 
     Returns:
         Blocks that together hold every message once, rows ascending within each block.
@@ -192,20 +221,20 @@ def decode(messages: Sequence[bytes], msgtype: str, types: Typesdict) -> list[Bl
         rows = np.flatnonzero(lengths == length)
         same = messages if rows.size == len(messages) else [messages[row] for row in rows.tolist()]
         table = np.frombuffer(b"".join(same), dtype=np.uint8).reshape(rows.size, int(length))
-        blocks += _split(rows, table, msgtype, types)
+        blocks += _split(rows, table, msgtype, types, encoding)
     return blocks
 
 
-def _split(rows: NDArray[np.intp], table: NDArray[np.uint8], msgtype: str, types: Typesdict) -> list[Block]:
+def _split(rows: NDArray[np.intp], table: NDArray[np.uint8], msgtype: str, types: Typesdict, encoding: str) -> list[Block]:
     """Blocks of messages of one length, ``table`` holding one message per row."""
     blocks: list[Block] = []
     while rows.size:
         try:
-            layout = layout_of(table[0].tobytes(), msgtype, types)
+            layout = layout_of(table[0].tobytes(), msgtype, types, encoding)
         except DecodeError as error:
             raise DecodeError(str(error), int(rows[0])) from None
         if len(blocks) < _MANY_LAYOUTS:
-            fixed = np.concatenate([np.arange(start, stop) for start, stop in layout.fixed])
+            fixed = np.concatenate([np.arange(start, stop) for start, stop in ((0, 0), *layout.fixed)])
             alike = (table[:, fixed] == table[0, fixed]).all(axis=1)
         else:
             # Strings that change from message to message: comparing all the rest each time would cost its square.

@@ -9,48 +9,28 @@ are compared by time of reception, on both sides, because the clock of the stamp
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..record import Array, Mask, Record, Units
-from .checks import Samples, Stamps, check_samples, gap_length_ns, pick_topic
+from .alignment import clocks, hermite, stamp_of
+from .checks import Samples, check_samples, pick_topic
+from .effort import EffortFrom, EffortSearch, command_topics
 from .errors import BagError, DamagedError
-from .series import Messages, Series, collect, series
+from .selection import split_topic
+from .series import Messages, Series, collect, joints_in, number_series, series
 from .source import Source
-from .topics import Raw, Topic
-from .types import FLOAT64, JOINT_STATE, REFERENCE, STAMPED_FORCE
+from .topics import Raw, Topic, Topics
+from .types import ARRAYS, FLOAT32, FLOAT64, JOINT_TYPES, REFERENCE, STAMPED_FORCE, TRAJECTORY_STATE
 
-__all__ = ["BagInfo", "EffortFrom", "TimeFrom", "Topics", "bag_info", "iterate_raw", "read_record"]
+__all__ = ["BagInfo", "EffortFrom", "TimeFrom", "Topics", "bag_info", "iterate_raw", "joint_list", "read_record"]
 
 TimeFrom = Literal["stamp", "log"]
-EffortFrom = Literal["auto", "joint_states", "command"]
 _HOLDS = ("following", "preceding", "linear")
-
-
-@dataclass(frozen=True)
-class Topics:
-    """Names of the topics in a bag; a name that is not there also matches one single topic under a namespace.
-
-    Attributes:
-        joint_states: ``sensor_msgs/msg/JointState``.
-        force_command: ``std_msgs/msg/Float64`` or ``fric_interfaces/msg/StampedForce`` [N or N m].
-        reference: ``fric_interfaces/msg/Reference``.
-        feedforward: as ``force_command``; not part of a record, but known to reports.
-        normal_load: as ``force_command`` [N], as are all further signals of a plant.
-        temperature: as ``normal_load`` [degC].
-    """
-
-    joint_states: str = "/joint_states"
-    force_command: str = "/force_command"
-    reference: str = "/reference"
-    feedforward: str = "/feedforward_force"
-    normal_load: str = "/normal_load"
-    temperature: str = "/temperature"
 
 
 class BagInfo(NamedTuple):
@@ -58,7 +38,7 @@ class BagInfo(NamedTuple):
 
     Attributes:
         path: the bag.
-        storage: ``mcap`` or ``sqlite3``.
+        storage: ``mcap``, ``sqlite3`` or ``ros1``.
         topics: with type and number of messages.
         custom: key and value pairs stored with the bag.
         notes: what is wrong with its files.
@@ -85,11 +65,11 @@ def iterate_raw(path: str | Path, topics: list[str] | None = None) -> Iterator[R
     """Messages of a bag as they were recorded, in the order of reception.
 
     Args:
-        path: bag folder, or a ``.mcap`` or ``.db3`` file.
+        path: bag folder, or a ``.mcap``, ``.db3`` or ``.bag`` file.
         topics: names of the topics; None for all.
 
     Yields:
-        Topic, message type, time of reception [ns] and CDR bytes.
+        Topic, message type, time of reception [ns] and bytes (CDR, or those of ROS 1).
 
     Raises:
         BagError: not a bag; a topic that is not there; damaged.
@@ -118,7 +98,7 @@ def read_record(
     """Read one joint of a recording.
 
     Args:
-        path: bag folder, or a ``.mcap`` or ``.db3`` file; also a bag whose recorder was killed.
+        path: bag folder, or a ``.mcap``, ``.db3`` or ``.bag`` file; also a bag whose recorder was killed.
         joint: name of the joint; None when there is only one.
         topics: names of the topics; the usual ones when None.
         time: ``stamp`` for the stamps of the headers, ``log`` for the time of reception.
@@ -158,6 +138,7 @@ class _Reading:
         self.notes = list(source.notes)
         self.by_log = time == "log"
         self.refused: dict[str, BagError] = {}
+        self.candidates: dict[str, Messages] = {}
 
     def record(self, joint: str | None, units: Units | None) -> Record:
         custom = self.source.custom
@@ -167,17 +148,22 @@ class _Reading:
         if not self.by_log and not states.stamped:
             self.by_log = True
             self.notes.append("all header stamps are zero: time of reception used")
-        time_ns = states.log_ns if self.by_log else _stamp(states)
-        signals = {"position": states.fields["position"]}
-        signals["effort"], from_command, valid = self._effort(states, raw)
+        time_ns = states.log_ns if self.by_log else stamp_of(states)
+        signals = {"position": self._position(states)}
+        search = EffortSearch(
+            self.where, self.topics, self.effort_from, self.by_log, states, raw, self.candidates, self.refused
+        )
+        effort = search.find()
+        signals["effort"] = effort.values
+        self.notes += effort.notes
         self._optional(states, raw, signals)
-        samples = Samples(time_ns, signals, valid, [])
+        samples = Samples(time_ns, signals, effort.valid, [])
         own_invalid = _stored_invalid(custom, samples.time_ns.size)
         samples.valid &= own_invalid
-        if from_command:
+        if effort.commanded:
             self._after_first_command(samples)
         check_samples(self.where, samples, repair=self.repair)
-        hold = custom.get("fric.effort_hold", "linear")
+        hold = "following" if effort.commanded else effort.hold or custom.get("fric.effort_hold", "linear")
         kept = samples.signals
         return Record(
             time=(samples.time_ns - samples.time_ns[0]) * 1e-9,
@@ -190,42 +176,59 @@ class _Reading:
             joint=states.joint,
             units=self._units(units),
             source=str(self.where),
-            effort_hold="following" if from_command or hold not in _HOLDS else hold,
+            effort_hold=hold if hold in _HOLDS else "following",
             notes=(*_stored_notes(custom), *self.notes, *samples.notes),
         )
 
     def _collect(self) -> dict[str, Messages]:
         """Raw messages of every topic that is needed, by its role."""
-        have, where = self.source.topics, self.where
+        have = self.source.topics
         if not any(topic.n_messages for topic in have):
-            raise BagError(where, "is empty: it holds no message", "record while the topics are being published")
-        roles: dict[str, Topic] = {}
-        types = {"joint_states": [JOINT_STATE], "force_command": [FLOAT64, STAMPED_FORCE], "reference": [REFERENCE]}
-        optional = {name: [FLOAT64, STAMPED_FORCE] for name in ("normal_load", "temperature", *self._extra())}
-        needed = {"joint_states", "force_command"} if self.effort_from == "command" else {"joint_states"}
-        for role, msgtypes in {**types, **optional}.items():
-            if role == "force_command" and self.effort_from == "joint_states":
+            raise BagError(self.where, "is empty: it holds no message", "record while the topics are being published")
+        roles: dict[str, Topic] = {"joint_states": self._joint_topic()}
+        force = [FLOAT64, STAMPED_FORCE, FLOAT32]
+        types = {"force_command": [*force, *ARRAYS], "reference": [REFERENCE, TRAJECTORY_STATE], "effort": []}
+        types |= dict.fromkeys(("normal_load", "temperature", *self._extra()), force)
+        named = {field.name for field in fields(Topics) if getattr(self.topics, field.name) != field.default}
+        needed = named | ({"force_command"} if self.effort_from == "command" else set())
+        for role, msgtypes in types.items():
+            given = getattr(self.topics, role, f"/{role}")
+            if not given or (role == "force_command" and self.effort_from == "joint_states"):
                 continue
-            name = getattr(self.topics, role, f"/{role}")
-            # The axis whose joint states are read has its other topics under the same namespace.
-            beside = _namespace(roles, self.topics) + name
-            name = beside if any(topic.name == beside for topic in have) else name
+            # A topic that was named is taken with any type that has numbers in it.
+            known = msgtypes if role == "reference" or role not in named else [topic.msgtype for topic in have]
             try:
-                roles[role], note = pick_topic(where, have, name, msgtypes, role)
+                roles[role] = self._pick(roles["joint_states"], split_topic(given)[0], known, role)
             except BagError as error:
                 if role in needed:
                     raise
                 self.refused[role] = error
-                continue
-            self.notes += [note] if note else []
-        found = collect(self.source, list(roles.values()))
+        others = [] if "force_command" in roles or self.topics.effort else command_topics(have)
+        found = collect(self.source, [*roles.values(), *others])
+        self.candidates = {topic.name: found[topic.name] for topic in others if found[topic.name].data}
+        needed |= {"joint_states"}
         return {role: found[topic.name] for role, topic in roles.items() if found[topic.name].data or role in needed}
+
+    def _pick(self, states: Topic, name: str, msgtypes: list[str], role: str) -> Topic:
+        """The topic of a role."""
+        # The axis whose joint states are read has its other topics under the same namespace.
+        beside = _namespace(states, self.topics) + name
+        name = beside if any(topic.name == beside for topic in self.source.topics) else name
+        topic, note = pick_topic(self.where, self.source.topics, name, msgtypes, role)
+        self.notes += [note] if note else []
+        return topic
+
+    def _joint_topic(self) -> Topic:
+        """The topic of the joint states: under its name, or the only one of another name that holds joints."""
+        topic, note = joint_topic(self.where, self.source.topics, self.topics)
+        self.notes += [note] if note else []
+        return topic
 
     def _extra(self) -> list[str]:
         """Names of further signals: those that the bag's writer named, and whatever a plant of ours has measured besides."""
         names = [name for name in self.source.custom.get("fric.extra", "").split(",") if name]
         if "fric.joint" in self.source.custom:
-            commands = (self.topics.force_command, "/feedforward_force")
+            commands = (split_topic(self.topics.force_command)[0], "/feedforward_force")
             names += [
                 topic.name.removeprefix("/")
                 for topic in self.source.topics
@@ -233,66 +236,13 @@ class _Reading:
             ]
         return list(dict.fromkeys(names))
 
-    def _effort(self, states: Series, raw: dict[str, Messages]) -> tuple[Array, bool, Mask]:
-        """Effort at each joint state, whether it comes from the command, and where it can be used."""
-        everywhere = np.ones(states.log_ns.size, dtype=np.bool_)
-        own = states.fields.get("effort")
-        if own is not None and self.effort_from != "command":
-            zero = not np.any(own)
-            if not zero or "force_command" not in raw:
-                self.notes += ["effort is zero throughout"] if zero else []
-                return own, False, everywhere
-        if self.effort_from == "joint_states":
-            raise BagError(
-                self.where,
-                f"joint '{states.joint}' has no effort in {states.topic}",
-                "read the force command in its place, or record the effort",
-            )
-        if "force_command" not in raw:
-            refusal = self.refused.get("force_command")
-            if refusal is not None and not refusal.problem.startswith(f"no topic {self.topics.force_command} in the bag"):
-                raise refusal  # it is there, but not as it is needed
-            raise BagError(
-                self.where,
-                f"no effort: {states.topic} has none for joint '{states.joint}' and there is no topic "
-                f"{self.topics.force_command} ({FLOAT64} or {STAMPED_FORCE})",
-                "record the effort or the force command, or name its topic with --topic force_command=NAME",
-            )
-        command = series(self.where, raw["force_command"], states.joint)
-        if own is not None and self.effort_from == "auto":
-            self.notes.append(f"effort is zero throughout in {states.topic}: taken from {command.topic}")
-        elif self.effort_from == "auto":
-            self.notes.append(f"{states.topic} has no effort: taken from {command.topic}, each command held until the next")
-        return self._held(states, command), True, self._while_commanded(states, command)
-
-    def _clocks(self, states: Series, other: Series) -> tuple[Stamps, Stamps, NDArray[np.intp]]:
-        """Times of the joint states and, sorted, of another topic, on one clock; and the order that sorts the other topic."""
-        if not self.by_log and other.stamped:
-            at, times = _stamp(states), _stamp(other)
-        else:
-            at, times = states.log_ns, other.log_ns
-        order = np.argsort(times, kind="stable")
-        return at, times[order], order
-
-    def _held(self, states: Series, command: Series) -> Array:
-        """The last command at or before each joint state; NaN before the first."""
-        at, times, order = self._clocks(states, command)
-        values = command.fields["data" if "data" in command.fields else "force"][order]
-        last = np.searchsorted(times, at, side="right") - 1
-        return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
-
-    def _while_commanded(self, states: Series, command: Series) -> Mask:
-        """False where commands have stopped for good while joint states go on: nobody knows what the drive then applies."""
-        at, times, _ = self._clocks(states, command)
-        valid = np.ones(at.size, dtype=np.bool_)
-        if times.size > 10:
-            valid = at <= times[-1] + gap_length_ns(times)
-            if not valid.all():
-                self.notes.append(
-                    f"commands on {command.topic} stop before the joint states: "
-                    f"the last {int((~valid).sum())} samples marked as not to be used"
-                )
-        return valid
+    def _position(self, states: Series) -> Array:
+        """Position of the joint, unless nothing can be made of it."""
+        position = states.fields["position"]
+        if position.size and not np.isfinite(position).any():
+            problem = f"position of joint '{states.joint}' is not finite (NaN or inf) at any of {position.size} samples"
+            raise BagError(self.where, problem, "choose another joint with --joint NAME, or record its position")
+        return position
 
     def _after_first_command(self, samples: Samples) -> None:
         """Leave out the joint states before the first command, whose effort is not known."""
@@ -310,11 +260,18 @@ class _Reading:
                 signals["velocity"] = velocity
             else:
                 self.notes.append("velocity left out: it is not finite (NaN or inf) in places")
+        if "reference" not in raw and "reference.position" in states.fields:
+            wanted = states.fields["reference.position"]  # of the trajectory controller whose state is read
+            signals |= {"reference": wanted} if np.isfinite(wanted).all() else {}
         for role, messages in raw.items():
-            if role in {"joint_states", "force_command"}:
+            if role in {"joint_states", "force_command", "effort"}:
                 continue
-            other = series(self.where, messages, states.joint)
-            at, times, order = self._clocks(states, other)
+            if role == "reference":
+                other = _reference(series(self.where, messages, states.joint))
+            else:
+                selection = split_topic(getattr(self.topics, role, ""))[1]
+                other = number_series(self.where, messages, states.joint, selection, role=role, certain=True)
+            at, times, order = clocks(states, other, self.by_log)
             fields = {name: values[order] for name, values in other.fields.items()}
             good = np.isfinite(np.stack(list(fields.values()))).all(axis=0)
             if not good.all():
@@ -324,10 +281,10 @@ class _Reading:
             if not times.size:
                 continue
             fields = {name: values[first] for name, values in fields.items()}
-            if role == "reference":
+            if role == "reference" and "velocity" in fields:
                 signals["reference"] = hermite(at, times, fields["position"], fields["velocity"])
             else:
-                values = fields["data" if "data" in fields else "force"]
+                values = fields["position" if role == "reference" else "value"]
                 signals[role] = np.interp((at - times[0]) * 1e-9, (times - times[0]) * 1e-9, values)
 
     def _units(self, given: Units | None) -> Units:
@@ -344,42 +301,62 @@ class _Reading:
         )
 
 
-def _namespace(roles: dict[str, Topic], topics: Topics) -> str:
-    """What stands before the usual name of the joint states in the name they were found under."""
-    states = roles.get("joint_states")
-    return states.name.removesuffix(topics.joint_states) if states and states.name.endswith(topics.joint_states) else ""
+def joint_topic(where: object, have: Sequence[Topic], topics: Topics) -> tuple[Topic, str | None]:
+    """The topic of the joint states, and a note when it is not the one literally asked for.
+
+    Raises:
+        BagError: there is none, or several.
+    """
+    name = topics.joint_states
+    try:
+        return pick_topic(where, have, name, JOINT_TYPES, "joint_states")
+    except BagError:
+        # Under its usual name only: whoever gave another one meant that. A command is no state, whatever its type.
+        others = [topic for topic in have if topic.msgtype in JOINT_TYPES and topic.n_messages and "command" not in topic.name]
+        tail = "/" + name.rsplit("/", 1)[-1]
+        if name != Topics.joint_states or not others or any(topic.name.endswith(tail) for topic in have):
+            raise
+    if len(others) > 1:
+        listed = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in others)
+        problem = f"no topic {name}, but several that hold joints: {listed}"
+        raise BagError(where, problem, "choose one with --topic joint_states=NAME")
+    return others[0], f"topic {name} is not in the bag; {others[0].name} ({others[0].msgtype}) was read in its place"
 
 
-def _stamp(of: Series) -> Stamps:
-    assert of.stamp_ns is not None
-    return of.stamp_ns
-
-
-def hermite(at: Stamps, times: Stamps, position: Array, velocity: Array) -> Array:
-    """Position between samples of position and velocity, by the cubic through both at either end.
-
-    Before the first sample, after the last and inside a gap the sample before is held (the first one, before it): a reference
-    that is not being published does not move.
+def joint_list(path: str | Path, topics: Topics | None = None) -> list[str]:
+    """Names of the joints in a recording, in the order in which they come.
 
     Args:
-        at: where it is wanted [ns], shape ``(n,)``.
-        times: of the samples, increasing [ns], shape ``(m,)``.
-        position: at these times [m or rad], shape ``(m,)``.
-        velocity: at these times [m/s or rad/s], shape ``(m,)``.
+        path: bag folder, or a ``.mcap``, ``.db3`` or ``.bag`` file.
+        topics: names of the topics; the usual ones when None.
+
+    Raises:
+        BagError: it is not a bag, or holds no joints.
     """
-    if times.size < 2:
-        return np.full(at.size, position[0])
-    left = np.clip(np.searchsorted(times, at, side="right") - 1, 0, times.size - 2)
-    step = times[left + 1] - times[left]
-    inside = (at >= times[0]) & (at <= times[-1]) & (step <= gap_length_ns(times))
-    h = step * 1e-9
-    s = np.clip((at - times[left]) / step, 0.0, 1.0)
-    p0, p1, v0, v1 = position[left], position[left + 1], velocity[left] * h, velocity[left + 1] * h
-    # Hermite basis in nested form: p0 + s v0 + s^2 (3 d - 2 v0 - v1) + s^3 (v0 + v1 - 2 d), d = p1 - p0.
-    d = p1 - p0
-    curve = p0 + s * (v0 + s * (3 * d - 2 * v0 - v1 + s * (v0 + v1 - 2 * d)))
-    held = np.where(at < times[0], position[0], np.where(at >= times[left + 1], p1, p0))
-    return np.where(inside, curve, held)
+    try:
+        return _joint_list(Source(path), topics or Topics())
+    except DamagedError:
+        return _joint_list(Source(path, recover=True), topics or Topics())
+
+
+def _joint_list(source: Source, topics: Topics) -> list[str]:
+    with source:
+        entry, _ = joint_topic(source.path, source.topics, topics)
+        return joints_in(source.path, collect(source, [entry])[entry.name])
+
+
+def _namespace(states: Topic, topics: Topics) -> str:
+    """What stands before the usual name of the joint states in the name they were found under."""
+    return states.name.removesuffix(topics.joint_states) if states.name.endswith(topics.joint_states) else ""
+
+
+def _reference(of: Series) -> Series:
+    """A reference with the field ``position``, and ``velocity`` if it has one; also that of a trajectory controller."""
+    for point in ("reference.", "desired."):
+        if f"{point}position" in of.fields:
+            names = [name for name in ("position", "velocity") if f"{point}{name}" in of.fields]
+            return of._replace(fields={name: of.fields[point + name] for name in names})
+    return of
 
 
 def _stored_invalid(custom: dict[str, str], n_samples: int) -> Mask:

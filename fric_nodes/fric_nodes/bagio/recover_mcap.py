@@ -9,29 +9,24 @@ from __future__ import annotations
 
 import mmap
 import struct
-import sys
 from binascii import crc32
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 
+from .blocks import UNPACK_ERRORS, unpacked
 from .errors import BagError
-from .topics import Raw, Topic
-
-if sys.version_info >= (3, 14):
-    from compression import zstd
-else:
-    from backports import zstd
+from .topics import Raw, Topic, ros2_name
 
 __all__ = ["MAGIC", "McapScan", "mcap_metadata"]
 
 MAGIC = b"\x89MCAP0\r\n"
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _METADATA, _DATA_END, _FOOTER = 0x03, 0x04, 0x05, 0x06, 0x0C, 0x0F, 0x02
 _MSG, _IDL = MessageDefinitionFormat.MSG, MessageDefinitionFormat.IDL
-_FORMATS = {"ros2msg": _MSG, "ros2idl": _IDL, "omgidl": _IDL}
+_FORMATS = {"ros2msg": _MSG, "ros1msg": _MSG, "ros2idl": _IDL, "omgidl": _IDL}
+_LATEST = 1 << 63  # [ns] since 1970; times are signed numbers everywhere else
 _UNDEFINED = MessageDefinition(MessageDefinitionFormat.NONE, "")
 
 
@@ -39,6 +34,7 @@ class _Channel(NamedTuple):
     topic: str
     msgtype: str
     definition: MessageDefinition
+    encoding: str
 
 
 def _string(content: bytes, at: int) -> tuple[str, int]:
@@ -51,7 +47,7 @@ def _string(content: bytes, at: int) -> tuple[str, int]:
 
 def _string_map(content: bytes, at: int) -> dict[str, str]:
     (size,) = struct.unpack_from("<I", content, at)
-    at, end = at + 4, at + 4 + size
+    at, end = at + 4, min(at + 4 + size, len(content))
     pairs: dict[str, str] = {}
     while at < end:
         key, at = _string(content, at)
@@ -67,17 +63,6 @@ def _records(content: bytes | mmap.mmap, at: int) -> Iterator[tuple[int, int, in
         start, stop = at + 9, at + 9 + size
         yield opcode, start, min(stop, total), stop <= total
         at = stop
-
-
-def _unpacked(data: bytes, compression: str) -> bytes:
-    """Content of a chunk, or as much of it as its first bytes give."""
-    if compression == "":
-        return data
-    if compression == "zstd":
-        return bytes(zstd.ZstdDecompressor().decompress(data))
-    if compression == "lz4":
-        return bytes(LZ4FrameDecompressor().decompress(data))
-    raise ValueError(f"compression {compression!r} is not known")
 
 
 class McapScan:
@@ -98,23 +83,27 @@ class McapScan:
         self.damage: list[str] = []
         self._channels: dict[int, _Channel] = {}
         self._schemas: dict[int, tuple[str, MessageDefinition]] = {}
+        self._odd = 0  # records that do not hold what they should
         if path.stat().st_size == 0:
             raise BagError(path, "is empty (0 bytes)", "record again")
         with path.open("rb") as file:
             self._content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         if self._content[: len(MAGIC)] != MAGIC:
+            self.close()
             raise BagError(path, "is not an MCAP file (its first bytes are not those of one)", "give a rosbag2 recording")
         counts: dict[int, int] = {}
         for channel, _, _ in self._messages(self.damage):
             counts[channel] = counts.get(channel, 0) + 1
         lost = sum(count for channel, count in counts.items() if channel not in self._channels)
+        if self._odd:
+            self.damage.append(f"{self._odd} records not readable and left out")
         if lost:
             self.damage.append(f"{lost} messages lost: the description of their topic is not readable")
         merged: dict[tuple[str, str], Topic] = {}
         for number, channel_entry in self._channels.items():
             key = (channel_entry.topic, channel_entry.msgtype)
             before = merged[key].n_messages if key in merged else 0
-            merged[key] = Topic(*key, before + counts.get(number, 0), channel_entry.definition)
+            merged[key] = Topic(*key, before + counts.get(number, 0), channel_entry.definition, channel_entry.encoding)
         self.topics = tuple(merged.values())
 
     def close(self) -> None:
@@ -146,21 +135,31 @@ class McapScan:
         try:
             size, crc = struct.unpack_from("<QI", content, 16)
             compression, head = _string(content, 28)
-            data = _unpacked(content[head + 8 :], compression)
-        except (struct.error, ValueError, RuntimeError, EOFError, zstd.ZstdError):
+            data = unpacked(content[head + 8 :], compression, size)
+        except (struct.error, *UNPACK_ERRORS):
             damage.append(f"block at byte {at} is not readable and left out")
             return
         if complete and (len(data) != size or (crc and crc32(data) != crc)):
             damage.append(f"block at byte {at} is damaged (checksum or size) and left out")
             return
+        end = 0
         for opcode, start, stop, whole in _records(data, 0):
-            if whole and opcode in {_SCHEMA, _CHANNEL, _MESSAGE}:
+            if not whole:
+                break
+            end = stop
+            if opcode in {_SCHEMA, _CHANNEL, _MESSAGE}:
                 yield from self._record(opcode, data[start:stop])
+            elif opcode < 0x80:
+                self._odd += 1  # nothing else is kept in a block
+        if complete and end < len(data):
+            damage.append(f"block at byte {at} is damaged: the rest of it from byte {end} on is left out")
 
     def _record(self, opcode: int, content: bytes) -> Iterator[tuple[int, int, bytes]]:
         try:
             if opcode == _MESSAGE:
                 channel, _, log_time = struct.unpack_from("<HIQ", content)
+                if log_time >= _LATEST or len(content) < 22:
+                    raise struct.error("no time of reception")
                 yield channel, log_time, content[22:]
             elif opcode == _SCHEMA:
                 (number,) = struct.unpack_from("<H", content)
@@ -171,11 +170,14 @@ class McapScan:
                 self._schemas[number] = (name, MessageDefinition(known, text))
             else:
                 number, schema = struct.unpack_from("<HH", content)
-                topic, _ = _string(content, 4)
+                topic, at = _string(content, 4)
+                encoding, _ = _string(content, at)
                 msgtype, definition = self._schemas.get(schema, ("unknown", _UNDEFINED))
-                self._channels[number] = _Channel(topic, msgtype, definition)
+                if encoding == "ros1":
+                    msgtype = ros2_name(msgtype)
+                self._channels[number] = _Channel(topic, msgtype, definition, "ros1" if encoding == "ros1" else "cdr")
         except struct.error:
-            return  # a record that does not hold what it should is as good as absent
+            self._odd += 1
 
 
 def mcap_metadata(path: Path, name: str) -> dict[str, str]:

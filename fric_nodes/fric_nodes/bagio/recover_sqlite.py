@@ -9,7 +9,6 @@ from __future__ import annotations
 import shutil
 import sqlite3
 import struct
-import sys
 from collections.abc import Collection, Iterator
 from contextlib import closing, suppress
 from pathlib import Path
@@ -17,20 +16,18 @@ from tempfile import TemporaryDirectory
 
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from ruamel.yaml.error import YAMLError, YAMLStreamError
 
+from .blocks import UNPACK_ERRORS, unpacked
 from .errors import BagError
 from .topics import Raw, Topic
-
-if sys.version_info >= (3, 14):
-    from compression import zstd
-else:
-    from backports import zstd
 
 __all__ = ["SqliteScan", "has_journal", "sqlite_metadata"]
 
 _JOURNALS = ("-journal", "-wal", "-shm")
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+# A damaged database may give texts and numbers that Python does not take, even in its own error messages.
+_ERRORS = (sqlite3.Error, ValueError, OverflowError, MemoryError)
 _FORMATS = {"ros2msg": MessageDefinitionFormat.MSG, "ros2idl": MessageDefinitionFormat.IDL}
 
 
@@ -72,11 +69,14 @@ class SqliteScan:
                     shutil.copyfile(beside, copy.with_name(copy.name + suffix))
             if not has_journal(path):
                 _fit_header(copy)
+            self._size = copy.stat().st_size
             self._connection = sqlite3.connect(copy)
+            # What a damaged schema may name (functions, virtual tables) is not to be run.
+            self._connection.execute("PRAGMA trusted_schema=OFF")
             self._names = self._read_topics()
         except BaseException as error:
             self.close()
-            if isinstance(error, sqlite3.DatabaseError):
+            if isinstance(error, _ERRORS):
                 raise BagError(
                     path, f"cannot be read as an SQLite bag ({error})", "it is truncated or damaged beyond use: record again"
                 ) from error
@@ -103,12 +103,15 @@ class SqliteScan:
             name, msgtype = self._names.get(number, ("", ""))
             if name and (topics is None or name in topics):
                 # A lone file does not say that its messages are compressed; the first bytes do.
-                plain = zstd.decompress(data) if data[:4] == _ZSTD_MAGIC else data
+                try:
+                    plain = unpacked(data, "zstd") if data[:4] == _ZSTD_MAGIC else data
+                except UNPACK_ERRORS:
+                    plain = data  # whoever decodes it refuses it
                 yield Raw(name, msgtype, log_time, plain)
 
     def _read_topics(self) -> dict[int, tuple[str, str]]:
         rows = self._connection.execute("SELECT id, name, type FROM topics ORDER BY id")
-        return {int(number): (str(name), str(msgtype)) for number, name, msgtype in rows}
+        return {number: (str(name), str(msgtype)) for number, name, msgtype in rows if isinstance(number, int)}
 
     def _read_definitions(self) -> dict[str, MessageDefinition]:
         query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
@@ -117,15 +120,28 @@ class SqliteScan:
                 str(name): MessageDefinition(_FORMATS.get(encoding, MessageDefinitionFormat.NONE), str(text))
                 for name, encoding, text in self._connection.execute(query)
             }
-        except sqlite3.DatabaseError:
+        except _ERRORS:
             return {}  # bags older than schema version 4 have no such table
 
     def _rows(self, damage: list[str]) -> Iterator[tuple[int, int, bytes]]:
+        taken = odd = 0
         try:
             # In the order of the row number: the index on the time may be damaged where the table is not.
-            yield from self._connection.execute("SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY id")
-        except sqlite3.DatabaseError as error:
+            rows = self._connection.execute("SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY id")
+            for number, log_time, data in rows:
+                if not (isinstance(number, int) and isinstance(log_time, int) and isinstance(data, bytes)):
+                    odd += 1
+                    continue
+                taken += len(data) + 1
+                if taken > self._size:
+                    # Pages that are referred to more than once: each row would come again and again.
+                    damage.append("read up to the row where there are more of them than the file has room for")
+                    break
+                yield number, log_time, data
+        except _ERRORS as error:
             damage.append(f"read up to its last readable row ({error})")
+        if odd:
+            damage.append(f"{odd} rows left out: they hold no message")
 
 
 def _fit_header(copy: Path) -> None:
@@ -152,7 +168,7 @@ def sqlite_metadata(path: Path) -> dict[str, str]:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)) as connection:
             row = connection.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
         content = YAML(typ="safe").load(row[0]) if row else None
-    except (sqlite3.Error, YAMLError):
+    except (*_ERRORS, YAMLError, YAMLStreamError, LookupError, TypeError, AttributeError, RecursionError):
         return {}
     custom = content.get("custom_data") if isinstance(content, dict) else None
     return {str(key): str(value) for key, value in custom.items()} if isinstance(custom, dict) else {}

@@ -12,11 +12,13 @@ from ..record import Array
 from .checks import Stamps, pick_joint, pick_topic
 from .decode import Block, DecodeError, decode
 from .errors import BagError, DamagedError
+from .joints import UnequalError, joint_fields, joint_names
+from .selection import SelectionError, select
 from .source import Source
 from .topics import Topic
-from .types import FLOAT64, JOINT_STATE, REFERENCE, STAMPED_FORCE, type_fields
+from .types import FLOAT64, JOINT_TYPES, REFERENCE, STAMPED_FORCE, type_versions
 
-__all__ = ["Messages", "Series", "collect", "read_series", "series"]
+__all__ = ["Messages", "Series", "collect", "joints_in", "number_series", "read_series", "series"]
 
 _JOINT_FIELDS = ("position", "velocity", "effort")
 _FIELDS = {
@@ -36,6 +38,7 @@ class Series(NamedTuple):
         log_ns: time of reception [ns].
         fields: values by the name of the message's field.
         joint: name of the joint, for joint states.
+        joints: names of all joints of the topic, for joint states.
         notes: what was left out, and why.
     """
 
@@ -46,6 +49,7 @@ class Series(NamedTuple):
     fields: dict[str, Array]
     joint: str = ""
     notes: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
 
     @property
     def stamped(self) -> bool:
@@ -54,7 +58,7 @@ class Series(NamedTuple):
 
 
 class Messages(NamedTuple):
-    """Raw messages of one topic: what the topic is, times of reception [ns], CDR bytes."""
+    """Raw messages of one topic: what the topic is, times of reception [ns], bytes."""
 
     topic: Topic
     log_ns: Stamps
@@ -74,6 +78,9 @@ def collect(source: Source, topics: Collection[Topic]) -> dict[str, Messages]:
     for topic in topics:
         log_ns = np.array(times[topic.name], dtype=np.int64)
         messages = data[topic.name]
+        if len(messages) != topic.n_messages and not source.recovered:
+            problem = f"is damaged ({len(messages)} of {topic.n_messages} messages of {topic.name} are where its index says)"
+            raise DamagedError(source.path, problem, "record again, or restore it from a copy")
         if np.any(np.diff(log_ns) < 0):  # several recorder threads, or files out of order
             order = np.argsort(log_ns, kind="stable")
             log_ns, messages = log_ns[order], [messages[index] for index in order]
@@ -95,22 +102,11 @@ def series(where: object, messages: Messages, joint: str | None = None, usual: s
         BagError: a message that does not fit its type; joint not there, or several; lists of unequal length.
     """
     topic = messages.topic
-    try:
-        blocks = decode(messages.data, topic.msgtype, type_fields(topic.msgtype, topic.definition))
-    except KeyError as error:
-        raise BagError(
-            where,
-            f"the bag does not define the type {topic.msgtype} of topic {topic.name}",
-            "record it with a recorder that does",
-        ) from error
-    except DecodeError as error:
-        raise BagError(
-            where, f"message {error.row} of topic {topic.name} is not a valid {topic.msgtype}: {error}", "record again"
-        ) from error
-    if topic.msgtype == JOINT_STATE:
+    blocks = _decoded(where, messages)
+    if topic.msgtype in JOINT_TYPES:
         return _joint_series(where, messages, blocks, joint, usual)
     wanted = _FIELDS.get(topic.msgtype) or _scalar_fields(blocks)
-    if any(key not in block.numbers for key in wanted.values() for block in blocks):
+    if any(key not in block.numbers or block.numbers[key].ndim != 1 for key in wanted.values() for block in blocks):
         raise BagError(where, f"{topic.msgtype} in the bag lacks one of the fields {', '.join(wanted)}", "record it anew")
     named = [block for block in blocks if joint is not None and block.strings.get("header.frame_id") == joint]
     blocks = named or blocks
@@ -126,11 +122,92 @@ def series(where: object, messages: Messages, joint: str | None = None, usual: s
     return Series(topic.name, topic.msgtype, stamp_ns, log_ns, fields)
 
 
+def number_series(where: object, messages: Messages, joint: str, selection: str, *, role: str, certain: bool) -> Series:
+    """Decode one number of each message of a topic; the only field of the result is ``value``.
+
+    Args:
+        where: the bag, for messages.
+        messages: raw messages of the topic.
+        joint: name of the joint.
+        selection: which number, see :mod:`.selection`; empty: the only one there is.
+        role: of the topic, as it is named on the command line.
+        certain: True when a single value can only be about this joint; a force whose ``frame_id`` names it is so in any case.
+
+    Raises:
+        BagError: a message that does not fit its type; no such number; nothing says which.
+    """
+    topic = messages.topic
+    blocks = _decoded(where, messages)
+    named = [block for block in blocks if block.strings.get("header.frame_id") == joint]
+    if named and topic.msgtype == STAMPED_FORCE:
+        blocks, certain = named, True
+    values = np.full(messages.log_ns.size, np.nan)
+    has = np.zeros(messages.log_ns.size, dtype=np.bool_)
+    for block in blocks:
+        try:
+            found = select(block, selection, joint, certain)
+        except SelectionError as error:
+            given = ", ".join(f"{topic.name}:{choice}" for choice in error.choices)
+            remedy = f"give --topic {role}=NAME with one of {given}" if given else f"give another topic, --topic {role}=NAME"
+            raise BagError(where, f"topic {topic.name} ({topic.msgtype}) {error}", remedy) from error
+        except UnequalError as error:
+            raise _unequal(where, messages, block, error) from error
+        if found is not None:
+            values[block.rows], has[block.rows] = found, True
+    if not has.any():
+        remedy = f"give another topic, --topic {role}=NAME"
+        raise BagError(where, f"topic {topic.name} ({topic.msgtype}) has nothing of joint '{joint}'", remedy)
+    stamp_ns = _stamps(blocks, messages.log_ns.size)
+    stamp_ns = None if stamp_ns is None else stamp_ns[has]
+    return Series(topic.name, topic.msgtype, stamp_ns, messages.log_ns[has], {"value": values[has]})
+
+
+def _decoded(where: object, messages: Messages) -> list[Block]:
+    """Decoded messages of a topic.
+
+    Raises:
+        BagError: the type is not known, or a message does not fit it.
+    """
+    topic = messages.topic
+    try:
+        versions = type_versions(topic.msgtype, topic.definition, topic.encoding)
+    except KeyError as error:
+        raise BagError(
+            where,
+            f"the bag does not define the type {topic.msgtype} of topic {topic.name}",
+            "record it with a recorder that does",
+        ) from error
+    for number, types in enumerate(versions, start=1):
+        try:
+            return decode(messages.data, topic.msgtype, types, topic.encoding)
+        except DecodeError as error:
+            if number == len(versions):
+                problem = f"message {error.row} of topic {topic.name} is not a valid {topic.msgtype}: {error}"
+                raise BagError(where, problem, "record again") from error
+    raise AssertionError("a type has at least one version")
+
+
+def joints_in(where: object, messages: Messages) -> list[str]:
+    """Names of the joints of a topic, in the order in which they come.
+
+    Raises:
+        BagError: a message that does not fit its type.
+    """
+    blocks = sorted(_decoded(where, messages), key=lambda block: int(block.rows[0]))
+    return list(dict.fromkeys(name for block in blocks for name in joint_names(block) or ()))
+
+
+def _unequal(where: object, messages: Messages, block: Block, error: UnequalError) -> BagError:
+    at = (messages.log_ns[block.rows[0]] - messages.log_ns[0]) * 1e-9
+    where_in = f"in {block.rows.size} messages of {messages.topic.name}, first at {at:.3f} s"
+    return BagError(where, f"{error} {where_in}", "record with a publisher that gives one value per joint")
+
+
 def read_series(path: str | Path, topic: str, joint: str | None = None) -> Series:
     """Read one topic of a recording into arrays.
 
     Args:
-        path: bag folder, or a ``.mcap`` or ``.db3`` file.
+        path: bag folder, or a ``.mcap``, ``.db3`` or ``.bag`` file.
         topic: name of the topic; a topic under a namespace that ends like it is taken too.
         joint: which joint, for joint states.
 
@@ -153,10 +230,10 @@ def _read_series(source: Source, topic: str, joint: str | None) -> Series:
 def _stamps(blocks: Sequence[Block], n_messages: int) -> Stamps | None:
     stamp_ns = np.zeros(n_messages, dtype=np.int64)
     for block in blocks:
-        if "header.stamp.sec" not in block.numbers:
+        seconds, parts = (block.numbers.get(f"header.stamp.{name}") for name in ("sec", "nanosec"))
+        if seconds is None or parts is None or seconds.ndim != 1 or parts.ndim != 1:
             return None
-        seconds = block.numbers["header.stamp.sec"].astype(np.int64)
-        stamp_ns[block.rows] = seconds * 1_000_000_000 + block.numbers["header.stamp.nanosec"]
+        stamp_ns[block.rows] = seconds.astype(np.int64) * 1_000_000_000 + parts.astype(np.int64)
     return stamp_ns
 
 
@@ -167,58 +244,47 @@ def _scalar_fields(blocks: Sequence[Block]) -> dict[str, str]:
     return {name: name for name in common if not name.startswith("header.")}
 
 
-def _names(block: Block) -> list[str]:
-    """Joints of joint states; numbered when they have no names."""
-    return list(block.strings["name"]) or [str(index) for index in range(block.numbers["position"].shape[1])]
-
-
 def _joint_series(where: object, messages: Messages, blocks: Sequence[Block], joint: str | None, usual: str | None) -> Series:
     topic, n_messages = messages.topic, messages.log_ns.size
-    joints = sorted({name for block in blocks for name in _names(block)})
+    joints = sorted({name for block in blocks for name in joint_names(block) or ()})
     if not joints:
         raise BagError(
             where, f"joint states on {topic.name} hold no joint", "choose another topic with --topic joint_states=NAME"
         )
     chosen = pick_joint(where, joints, joint, usual)
     stamp_ns = _stamps(blocks, n_messages)
-    assert stamp_ns is not None  # joint states have a header
     has = np.zeros(n_messages, dtype=np.bool_)
-    columns = {name: np.full(n_messages, np.nan) for name in _JOINT_FIELDS}
-    absent = dict.fromkeys(_JOINT_FIELDS, 0)
+    columns: dict[str, Array] = {name: np.full(n_messages, np.nan) for name in _JOINT_FIELDS}
+    present = dict.fromkeys(_JOINT_FIELDS, 0)
     for block in blocks:
-        names = _names(block)
+        names = joint_names(block) or []
         if chosen not in names:
             continue  # another publisher's joints
         has[block.rows] = True
-        for name in _JOINT_FIELDS:
-            values = block.numbers[name]
-            if values.shape[1] == len(names):
-                columns[name][block.rows] = values[:, names.index(chosen)]
-            elif values.shape[1] == 0:
-                absent[name] += block.rows.size
-            else:
-                at = (messages.log_ns[block.rows[0]] - messages.log_ns[0]) * 1e-9
-                where_in = f"in {block.rows.size} messages of {topic.name}, first at {at:.3f} s"
-                raise BagError(
-                    where,
-                    f"{name} has {values.shape[1]} values for {len(names)} joints {where_in}",
-                    "record with a publisher that gives one value per joint",
-                )
+        try:
+            found = joint_fields(block, names, chosen)
+        except UnequalError as error:
+            raise _unequal(where, messages, block, error) from error
+        for name, values in found.items():
+            columns.setdefault(name, np.full(n_messages, np.nan))[block.rows] = values
+            present[name] = present.get(name, 0) + block.rows.size
     total = int(has.sum())
     fields: dict[str, Array] = {}
     notes: list[str] = []
-    for name in _JOINT_FIELDS:
-        if 0 < absent[name] < total:
+    for name, there in present.items():
+        if 0 < there < total and name in _JOINT_FIELDS:
+            absent = total - there
             if name == "velocity":
-                notes.append(f"velocity left out: it is missing in {absent[name]} of {total} messages of {topic.name}")
+                notes.append(f"velocity left out: it is missing in {absent} of {total} messages of {topic.name}")
                 continue
             raise BagError(
                 where,
-                f"{name} is missing in {absent[name]} of {total} messages of {topic.name}",
+                f"{name} is missing in {absent} of {total} messages of {topic.name}",
                 "record with one publisher only",
             )
-        if not absent[name]:
+        if there == total:
             fields[name] = columns[name][has]
     if "position" not in fields:
         raise BagError(where, f"joint '{chosen}' has no position on {topic.name}", "record a publisher that gives positions")
-    return Series(topic.name, topic.msgtype, stamp_ns[has], messages.log_ns[has], fields, chosen, tuple(notes))
+    stamp_ns = None if stamp_ns is None else stamp_ns[has]
+    return Series(topic.name, topic.msgtype, stamp_ns, messages.log_ns[has], fields, chosen, tuple(notes), tuple(joints))

@@ -1,12 +1,13 @@
 """Opening a recording, whatever state it is in: one source of raw messages for all that reads bags.
 
-Bags in order are read through ``rosbags``. A bag that its recorder did not close, a lone storage file and a folder without
-``metadata.yaml`` are read record by record as far as they go; what was wrong is kept in :attr:`Source.notes`.
+ROS 2 bags in order are read through ``rosbags``. A bag that its recorder did not close, a lone storage file, a folder without
+``metadata.yaml`` and a ROS 1 bag are read record by record as far as they go; what was wrong is kept in :attr:`Source.notes`.
 """
 
 from __future__ import annotations
 
 import shutil
+import struct
 import sys
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack
@@ -16,9 +17,11 @@ from types import TracebackType
 
 import apsw
 from rosbags.rosbag2 import Reader, ReaderError
+from ruamel.yaml.error import YAMLError, YAMLStreamError
 
 from .errors import BagError, DamagedError
 from .recover_mcap import McapScan, mcap_metadata
+from .recover_ros1 import Ros1Scan
 from .recover_sqlite import SqliteScan, has_journal, sqlite_metadata
 from .topics import Raw, Topic
 
@@ -29,10 +32,11 @@ else:
 
 __all__ = ["Source"]
 
-_REMEDY = "give a rosbag2 folder, or a .mcap or .db3 file"
-# What the library lets through when a file is not what it should be.
-_LIBRARY_ERRORS = (ReaderError, OSError, ValueError, IndexError, KeyError, EOFError, AssertionError, RuntimeError)
-_DAMAGE = (*_LIBRARY_ERRORS, apsw.Error, zstd.ZstdError, TypeError)
+_REMEDY = "give a rosbag2 folder, or a .mcap, .db3 or .bag file"
+# What the library lets through when a file is not what it should be. Lengths come from the file: hence the last two.
+_LIBRARY_ERRORS = (ReaderError, OSError, ValueError, LookupError, EOFError, AssertionError, RuntimeError, AttributeError)
+_FOREIGN_ERRORS = (apsw.Error, zstd.ZstdError, YAMLError, YAMLStreamError, struct.error)
+_DAMAGE = (*_LIBRARY_ERRORS, *_FOREIGN_ERRORS, TypeError, MemoryError, OverflowError)
 
 
 def _storage_files(folder: Path) -> list[Path]:
@@ -42,7 +46,9 @@ def _storage_files(folder: Path) -> list[Path]:
 
 
 def _kind(path: Path) -> str | None:
-    """``mcap`` or ``sqlite3`` by the name, None for anything else."""
+    """``mcap``, ``sqlite3`` or ``ros1`` by the name, None for anything else."""
+    if path.name.endswith((".bag", ".bag.active")):
+        return "ros1"
     name = path.name.removesuffix(".zstd")
     return "mcap" if name.endswith(".mcap") else "sqlite3" if name.endswith(".db3") else None
 
@@ -53,7 +59,7 @@ class Source:
     Attributes:
         path: what the user gave.
         topics: topics with their types and numbers of messages.
-        storage: ``mcap`` or ``sqlite3``.
+        storage: ``mcap``, ``sqlite3`` or ``ros1``.
         custom: the key and value pairs that the recorder stored with the bag.
         notes: what was wrong with the files and how they were read all the same.
     """
@@ -62,7 +68,7 @@ class Source:
         """Open a recording.
 
         Args:
-            path: bag folder, or a ``.mcap`` or ``.db3`` file.
+            path: bag folder, or a ``.mcap``, ``.db3`` or ``.bag`` file.
             recover: read record by record even if the bag looks in order.
 
         Raises:
@@ -75,7 +81,7 @@ class Source:
         self.topics: tuple[Topic, ...] = ()
         self._stack = ExitStack()
         self._reader: Reader | None = None
-        self._scans: list[McapScan | SqliteScan] = []
+        self._scans: list[McapScan | SqliteScan | Ros1Scan] = []
         self._refusal = ""  # why the library does not read it
         files = self._find()
         try:
@@ -115,6 +121,8 @@ class Source:
             return
         try:
             for connection, log_time, data in self._reader.messages(chosen):
+                if not 0 <= log_time < 1 << 63:
+                    raise ValueError(f"a time of reception of {log_time} ns")
                 yield Raw(connection.topic, connection.msgtype, log_time, data)
         except _DAMAGE as error:
             raise DamagedError(self.path, f"is damaged ({error})", "record again, or restore it from a copy") from error
@@ -125,15 +133,22 @@ class Source:
             raise BagError(path, "is not there", "check the path")
         if path.is_file():
             if _kind(path) is None:
-                raise BagError(path, "is not a recording (neither .mcap nor .db3)", _REMEDY)
+                raise BagError(path, "is not a recording (neither .mcap nor .db3 nor .bag)", _REMEDY)
             return [path]
-        files = _storage_files(path)
-        if not files:
-            raise BagError(path, "is not a bag: there is no .mcap or .db3 file in it", _REMEDY)
-        return files
+        found = _storage_files(path)
+        files = [file for file in found if _kind(file) != "ros1"]
+        ros1 = [file for file in found if _kind(file) == "ros1"]
+        if not files and len(ros1) > 1:
+            listed = ", ".join(file.name for file in ros1)
+            raise BagError(path, f"holds several ROS 1 bags: {listed}", "give one of them, or each as a recording of its own")
+        if not found:
+            raise BagError(path, "is not a bag: there is no .mcap or .db3 file in it, and no .bag file", _REMEDY)
+        return files or ros1
 
     def _open_library(self, files: list[Path]) -> bool:
         """Open through rosbags; False, with a note, when that does not work."""
+        if _kind(files[0]) == "ros1":
+            return False
         in_order = self.path.is_dir() and (self.path / "metadata.yaml").is_file()
         if self.path.is_dir() and not in_order:
             self.notes.append("metadata.yaml is missing: the recorder was not stopped properly")
@@ -172,8 +187,13 @@ class Source:
         for file in files:
             plain = self._unpacked(file) if file.name.endswith(".zstd") else file
             kind = _kind(file)
+            scans: dict[str, type[McapScan | SqliteScan | Ros1Scan]] = {
+                "mcap": McapScan,
+                "sqlite3": SqliteScan,
+                "ros1": Ros1Scan,
+            }
             try:
-                scan: McapScan | SqliteScan = McapScan(plain) if kind == "mcap" else SqliteScan(plain)
+                scan: McapScan | SqliteScan | Ros1Scan = scans[kind or ""](plain)
             except BagError as error:
                 raise BagError(file, error.problem, error.remedy) from error
             self._stack.callback(scan.close)
@@ -192,6 +212,8 @@ class Source:
             raise BagError(self.path, "holds no complete message", "it is truncated beyond use or empty: record again")
 
     def _stored_custom(self, file: Path) -> dict[str, str]:
+        if _kind(file) == "ros1":
+            return {}
         return mcap_metadata(file, "fric") if _kind(file) == "mcap" else sqlite_metadata(file)
 
     def _unpacked(self, file: Path) -> Path:

@@ -61,6 +61,7 @@ def diagnose(
     """Find what physics a model leaves out, and write report.html, report.json, model.yaml and prediction.csv."""
     from ..diagnosis import diagnose as find
     from ..diagnosis.blocks import in_blocks
+    from ..identification.force_needed import require_force
     from ..model_file import read_model
 
     given = validate or []
@@ -73,6 +74,7 @@ def diagnose(
     reading = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
     progress(f"reading {len(train) + len(given)} recording(s)")
     records = read_all(train, reading)
+    require_force(records)
     records, kept_apart = (records, read_all(given, reading)) if blocks is None else in_blocks(records, blocks)
     found = find(records, kept_apart, nominal, progress)
     write_diagnosis(out, found, records, kept_apart)

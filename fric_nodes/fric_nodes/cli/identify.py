@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
+from .identify_joints import ALL, identify_each
 from .identify_shown import print_design, print_intervals, print_result, summary_of, uncertainty_json
 from .options import (
     EndOption,
-    JointOption,
+    JointsOption,
     JsonOption,
     OutOption,
     ReadOptions,
@@ -66,7 +67,7 @@ def identify(
         str,
         typer.Option("--method", help="How to fit; 'fric model methods' lists them all, with the experiment that each needs."),
     ] = "inverse-dynamics",
-    joint: JointOption = None,
+    joint: JointsOption = None,
     cutoff: Annotated[
         float | None, typer.Option("--cutoff", help="Low-pass filter on the position [Hz]; a tenth of the rate, at most 100.")
     ] = None,
@@ -126,7 +127,9 @@ def identify(
     as_json: JsonOption = False,
 ) -> None:
     """Identify a model's parameters from recordings and write model.yaml, identification.json and report.html."""
+    asked = dict(locals())
     from ..identification.equations import nominal_conditions
+    from ..identification.force_needed import require_force
     from ..identification.result import Options
 
     _check(cutoff, decimation, rest_velocity, horizon, starts, tries)
@@ -142,6 +145,9 @@ def identify(
     reading = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
     kept_apart = validate or []
     _refuse_overlap(given, kept_apart)
+    if joint == ALL:
+        identify_each([*given, *kept_apart], reading, identify, asked)
+        return
     progress(f"reading {len(given) + len(kept_apart)} recording(s)")
     records = read_all(given, reading)
     validation = read_all(kept_apart, reading)
@@ -149,6 +155,8 @@ def identify(
     # What a load or a temperature is relative to belongs to the model: a recording under another load has another mean.
     structure = replace(structure, nominal=nominal_conditions(records) | dict(structure.nominal))
     records, validation = ([replace(each, nominal=structure.nominal) for each in held] for held in (records, validation))
+    if chosen.needs_force:
+        require_force(records, structure, options.held)
     checks = _inspect(records)
     result = replace(_fit(chosen, structure, records, validation, options, experiments=not design), checks=checks)
     summary = summary_of(result)

@@ -11,11 +11,13 @@ import typer
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from ..bagio.topics import Topics
     from ..record import Record
 
 __all__ = [
     "EndOption",
     "JointOption",
+    "JointsOption",
     "JsonOption",
     "OutOption",
     "ReadOptions",
@@ -28,6 +30,9 @@ __all__ = [
 ]
 
 JointOption = Annotated[str | None, typer.Option("--joint", help="Name of the joint, where a recording holds several.")]
+JointsOption = Annotated[
+    str | None, typer.Option("--joint", help="Name of the joint, where a recording holds several; 'all' for each of them.")
+]
 RepairOption = Annotated[
     bool, typer.Option("--repair", help="Drop or mark bad samples instead of refusing the recording; says what was dropped.")
 ]
@@ -36,7 +41,12 @@ StartOption = Annotated[float | None, typer.Option("--start", help="Leave out wh
 EndOption = Annotated[float | None, typer.Option("--end", help="Leave out what comes after this time [s].")]
 TopicOption = Annotated[
     list[str] | None,
-    typer.Option("--topic", help="Another topic name, such as joint_states=/robot/joint_states; may be repeated."),
+    typer.Option(
+        "--topic",
+        help="Another topic name, such as joint_states=/robot/joint_states; may be repeated. Which number of a message is "
+        "meant stands behind a colon: force_command=/arm/commands:0 is the first value of a list, "
+        ":shoulder,elbow gives the joints in the order of its values, effort=/ft/wrench:wrench.force.z names a field.",
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, for programs.")]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results; made when missing.")]
@@ -53,6 +63,23 @@ class ReadOptions:
     end: float | None = None
     topics: tuple[str, ...] = ()
 
+    def topic_names(self) -> Topics:
+        """Names of the topics.
+
+        Raises:
+            InputError: not ROLE=NAME, or no such role.
+        """
+        from ..bagio.topics import Topics
+
+        names = {}
+        for entry in self.topics:
+            role, found, name = entry.partition("=")
+            if not found or not name.partition(":")[0].strip() or role not in Topics.__dataclass_fields__:
+                roles = ", ".join(Topics.__dataclass_fields__)
+                raise InputError("--topic", f"'{entry}' is not ROLE=NAME", f"use a role of {roles}")
+            names[role] = name
+        return Topics(**names)
+
 
 def read_all(paths: list[Path], options: ReadOptions) -> list[Record]:
     """The recordings at ``paths``, with end stops and saturation left out.
@@ -60,25 +87,18 @@ def read_all(paths: list[Path], options: ReadOptions) -> list[Record]:
     Raises:
         InputError: one of them can't be used.
     """
-    from ..bagio.read import Topics, read_record
+    from ..bagio.read import read_record
     from ..identification.screen import screened
 
     if options.time not in {"stamp", "log"}:
         raise InputError("--time", f"'{options.time}' is not known", "use stamp or log")
-    names = {}
-    for entry in options.topics:
-        role, found, name = entry.partition("=")
-        if not found or role not in Topics.__dataclass_fields__:
-            raise InputError(
-                "--topic", f"'{entry}' is not ROLE=NAME", f"use a role of {', '.join(Topics.__dataclass_fields__)}"
-            )
-        names[role] = name
+    topics = options.topic_names()
     return [
         screened(
             read_record(
                 path,
                 joint=options.joint,
-                topics=Topics(**names),
+                topics=topics,
                 time="log" if options.time == "log" else "stamp",
                 repair=options.repair,
                 start=options.start,

@@ -67,4 +67,5 @@ METHOD = Method(
     needs="a free oscillation: released from a deflection, no force but a spring or a feedback of position and velocity",
     source="Feldman 1994; de Marchi 1998",
     fit=fit,
+    needs_force=False,
 )

@@ -143,4 +143,5 @@ METHOD = Method(
     needs="a free oscillation: released from a deflection, no force but a spring or a feedback of position and velocity",
     source="de Marchi 1998",
     fit=fit,
+    needs_force=False,
 )

@@ -263,4 +263,5 @@ METHOD = Method(
     needs="free oscillations under P + D feedback, with gains that differ from one recording to the next",
     source="de Marchi 1998",
     fit=fit,
+    needs_force=False,
 )

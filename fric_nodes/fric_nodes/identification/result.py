@@ -147,6 +147,7 @@ class Method:
         fit: structure (a model whose values are the start), recordings and options to a result.
         predicts: what it compares with the recording sample by sample, for statements before a fit: ``force`` along the motion,
             ``position`` from one sample to the next; empty where a fit sees something else.
+        needs_force: False where no force need act, as in a free oscillation; otherwise one that never changes is refused.
     """
 
     id: str
@@ -155,3 +156,4 @@ class Method:
     source: str
     fit: Callable[[Model, Sequence[Record], Options], Identification] = field(repr=False)
     predicts: str = ""
+    needs_force: bool = True

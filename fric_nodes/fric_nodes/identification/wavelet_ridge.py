@@ -82,4 +82,5 @@ METHOD = Method(
     needs="a free oscillation: released from a deflection, no force but a spring or a feedback of position and velocity",
     source="Ruzzene, Fasana, Garibaldi, Piombo 1997; de Marchi 1998",
     fit=fit,
+    needs_force=False,
 )

@@ -78,6 +78,9 @@ class PlayerNode(OrderlyNode):
     def _open(self, topics: list[str]) -> None:
         """Make a publisher for every topic to be played whose type is installed."""
         known = {topic.name: topic for topic in bag_info(self._bag).topics}
+        if any(topic.encoding == "ros1" for topic in known.values()):
+            remedy = f"convert it first: rosbags-convert --src {self._bag} --dst {self._bag.with_suffix('')}_ros2"
+            raise BagError(self._bag, "is a ROS 1 bag, whose messages no ROS 2 node takes", remedy)
         for name in topics:
             if name not in known:
                 raise BagError(self._bag, f"no topic {name} in the bag; it holds: {', '.join(known)}", "choose among these")
