@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from fric_nodes.diagnosis.fitting import best_track
-from fric_nodes.diagnosis.track import Track, resolution
+from fric_nodes.diagnosis.track import Track
 from fric_nodes.diagnosis.twin import twins
 from fric_nodes.model import Model, Term, build_model, term
 from fric_nodes.record import Record
@@ -117,11 +117,3 @@ def test_where_nothing_is_missing_to_any_observer_the_one_that_has_seen_it_is_ke
         assert best_track(tracks, complete, otherwise=track)[0] is track
     # Where something is, the fastest that sees it clearly.
     assert best_track(tracks, model(), otherwise=tracks[0])[0] is tracks[2]
-
-
-def test_the_step_of_an_encoder_is_found_also_where_the_axis_rests_and_hurries() -> None:
-    random = np.random.default_rng(8)
-    jumps = np.where(random.random(4000) < 0.1, random.integers(3, 90, 4000), 0)
-    jumps[2000] = 1  # once
-    assert resolution(np.cumsum(jumps) * 1e-5) == pytest.approx(1e-5, rel=1e-6)
-    assert resolution(np.cumsum(random.standard_normal(4000))) == 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.identification.statistics import bartlett_lag, by_parts, noise_of, resolution_of, sandwich_covariance
+from fric_nodes.identification.statistics import bartlett_lag, by_parts, sandwich_covariance
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -127,24 +127,3 @@ def test_parts_cover_where_few_parts_carry_the_estimate() -> None:
     assert plain / 1500 < 0.82
     assert 0.84 <= hits / 1500 <= 0.95
     assert hits > plain + 75
-
-
-@pytest.mark.parametrize(("step", "expected"), [(1e-7, 1e-7), (0.25, 0.25)])
-def test_the_step_of_a_rounded_signal(step: float, expected: float) -> None:
-    rng = np.random.default_rng(11)
-    smooth = 300.0 * step * np.sin(np.linspace(0.0, 40.0, 5000))
-    rounded = step * np.round((smooth + 0.3 * step * rng.standard_normal(5000)) / step) + 0.1 * step
-    assert resolution_of(rounded) == pytest.approx(expected, rel=1e-6)
-    assert resolution_of(smooth) == 0.0
-    assert resolution_of(smooth + 1e-3 * step * rng.standard_normal(5000)) == 0.0
-
-
-def test_what_is_not_rounded_has_no_step_and_what_rests_neither() -> None:
-    assert resolution_of(np.zeros(100)) == 0.0
-    assert resolution_of(np.full(100, 0.123)) == 0.0
-
-
-def test_white_noise_is_found_under_a_motion() -> None:
-    t = np.linspace(0.0, 10.0, 5000)
-    noisy = np.sin(2.0 * np.pi * t) + 1e-4 * np.random.default_rng(12).standard_normal(5000)
-    assert noise_of(noisy) == pytest.approx(1e-4, rel=0.1)

@@ -19,9 +19,9 @@ import numpy as np
 from scipy.signal import butter, correlate, sosfiltfilt
 
 from ..errors import InputError
-from ..identification.statistics import noise_of
 from ..model import Model, build_model
 from ..record import Array, Mask, Record
+from ..signals.resolution import noise_of
 from .candidates import scales_of
 from .locate import Where, locate, steady
 from .track import Track

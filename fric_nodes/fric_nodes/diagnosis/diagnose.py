@@ -17,11 +17,12 @@ import numpy as np
 from ..effect import Effect
 from ..effects import EFFECTS
 from ..identification.equations import nominal_conditions
-from ..identification.statistics import noise_of, sandwich_covariance
+from ..identification.statistics import sandwich_covariance
 from ..instrument import Correction, inspect
 from ..instrument import Finding as Check
 from ..model import Model, Term
 from ..record import Array, Record
+from ..signals.resolution import noise_of
 from ..threads import linear_algebra_in_one
 from .blocks import one_sided
 from .candidates import FRICTION, Scales, candidates, place_of, scales_of

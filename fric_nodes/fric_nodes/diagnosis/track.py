@@ -34,15 +34,16 @@ from scipy.ndimage import binary_dilation
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from ..identification.gauss_newton import Solution, minimise
-from ..identification.innovations import Run, noise_of, runs_of
+from ..identification.innovations import Run, runs_of
 from ..model import Model, Term
 from ..plants import PLANTS
 from ..record import Array, Index, Record
+from ..signals.resolution import noise_of, step_of
 from ..simulate import respond, substeps
 from ..threads import n_threads
 from .universe import universe_of
 
-__all__ = ["Bounds", "Fit", "Motion", "Track", "Twin", "fitted_values", "resolution", "smooth"]
+__all__ = ["Bounds", "Fit", "Motion", "Track", "Twin", "fitted_values", "smooth"]
 
 _SMOOTH = 4.0  # times the bandwidth: of the motion along which a force is needed
 _SMOOTH_LED = 2.0  # the same, where a contact is led: less of the encoder's noise
@@ -79,20 +80,6 @@ class Twin:
     efforts: tuple[Array, ...]
     positions: tuple[Array, ...]
     extras: tuple[Array, ...]
-
-
-def resolution(position: Array) -> float:
-    """The step of the encoder [x]: the smallest change that is common; 0 when there is none."""
-    change = np.abs(np.diff(position))
-    change = change[change > 0.0]
-    if change.size < 20:
-        return 0.0
-    # An axis that rests most of the time and hurries otherwise hardly ever moves by one step: then it is the smallest change.
-    for smallest in (float(np.quantile(change, 0.02)), float(np.min(change))):
-        counts = change / smallest
-        if float(np.mean(np.abs(counts - np.round(counts)) < 0.05)) > 0.9:
-            return smallest
-    return 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +195,7 @@ class Track:
                 runs.append(run)
                 time.append(record.time[first] + np.cumsum(run.step))
                 number.append(k)
-                noise.append(max(noise_of(run.position), _SHAKEN * resolution(run.position)))
+                noise.append(max(noise_of(run.position), _SHAKEN * step_of(run.position)))
         mass = model.total_inertia
         return cls(
             tuple(runs),

@@ -13,10 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..identification.innovations import Run, noise_of
+from ..identification.innovations import Run
 from ..model import Model
 from ..record import Array
-from .track import Track, Twin, resolution, smooth
+from ..signals.resolution import noise_of, step_of
+from .track import Track, Twin, smooth
 from .universe import universe_of
 
 __all__ = ["twins"]
@@ -67,7 +68,7 @@ def _noisy(runs: Sequence[Run], led: Sequence[tuple[Array, Array, Array]], rando
     efforts, positions = [], []
     for run, (there, _, given) in zip(runs, led, strict=True):
         efforts.append(given + run.force_noise(random) + run.between * random.standard_normal(given.shape[0]))
-        step = resolution(run.position)
+        step = step_of(run.position)
         # What the steps of the encoder don't explain of the noise is the sensor's own.
         own = math.sqrt(max(noise_of(run.position) ** 2 - step**2 / 12.0, 0.0))
         # A model that escapes, however it is led, has a twin that runs away: far enough to be told, not beyond all numbers.

@@ -21,11 +21,10 @@ from enum import Enum
 
 import numpy as np
 
-from ..identification.statistics import noise_of
 from ..model import Model
 from ..record import Array, Record
+from ..signals.resolution import noise_of, step_of
 from ..simulate import substeps
-from .track import resolution
 
 __all__ = ["BANDWIDTHS", "Phase", "Watch", "WatchSettings"]
 
@@ -252,7 +251,7 @@ class Watch:
 
     @staticmethod
     def _noise(position: Array) -> float:
-        return max(noise_of(position), 0.4 * resolution(position))
+        return max(noise_of(position), 0.4 * step_of(position))
 
     def _work(self) -> None:
         """A block: what the observers find missing in it."""

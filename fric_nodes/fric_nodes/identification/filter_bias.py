@@ -19,11 +19,11 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array, Record
+from ..signals.resolution import noise_of, step_of
 from ..simulate import Predictor, Simulator, substeps
 from .equations import Equations, Stretch, equations
 from .result import Options
 from .scoring import force_along, force_over_intervals
-from .statistics import noise_of, resolution_of
 
 __all__ = ["residual_of_filters"]
 
@@ -52,7 +52,7 @@ def residual_of_filters(model: Model, found: Equations) -> Array:
 
 def _seen(position: Array, noise: Array, like: Array) -> Array:
     """``position`` as the instrument of the signal ``like`` sees it; ``noise`` of unit size says how the noise goes."""
-    step = resolution_of(like)
+    step = step_of(like)
     white = math.sqrt(max(noise_of(like) ** 2 - step**2 / 12.0, 0.0))
     seen = position + white * noise
     if step == 0.0:

@@ -27,11 +27,12 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array, Index, Mask
+from ..signals.resolution import noise_of
 from ..simulate import Predictor, Simulator, intervals, substeps
 from .bootstrap import drawn_series
 from .equations import Equations, Stretch
 from .free_parameters import FreeParameters
-from .innovations import SETTLING, Run, gains, innovations, noise_of
+from .innovations import SETTLING, Run, gains, innovations
 
 __all__ = ["ForceErrors", "force_errors"]
 

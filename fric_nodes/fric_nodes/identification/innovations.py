@@ -20,11 +20,11 @@ from scipy.special import comb
 
 from ..model import Model
 from ..record import Array, Record
+from ..signals.resolution import noise_of
 from ..simulate import intervals
 from .equations import surroundings
-from .statistics import noise_of
 
-__all__ = ["SETTLING", "Run", "excerpt", "gains", "innovations", "noise_of", "runs_of"]
+__all__ = ["SETTLING", "Run", "excerpt", "gains", "innovations", "runs_of"]
 
 SETTLING = 20
 """Innovations dropped at the start of each run."""

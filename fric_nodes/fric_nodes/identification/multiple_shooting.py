@@ -31,10 +31,10 @@ from scipy.sparse.linalg import splu
 
 from ..model import Model
 from ..record import Array, Index
+from ..signals.resolution import noise_of
 from ..simulate import Predictor, Simulator, intervals, substeps
 from .equations import Equations, Stretch
 from .force_errors import ForceErrors
-from .innovations import noise_of
 
 __all__ = ["Run", "Shooting", "runs_over", "shooting"]
 

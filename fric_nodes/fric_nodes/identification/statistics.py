@@ -13,11 +13,10 @@ residual and a row, both are handed in as they are.
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import comb, ndtri, stdtrit
+from scipy.special import ndtri, stdtrit
 
 from ..record import Array, Index
 
@@ -27,19 +26,15 @@ __all__ = [
     "covariance_by_parts",
     "definite",
     "long_run",
-    "noise_of",
     "parts_of",
-    "resolution_of",
     "sandwich",
     "sandwich_covariance",
     "window_loss",
 ]
 
-_DIFFERENCES = 6  # of a signal, which leave its white noise and hardly any of its motion
 _PARTS = 40  # of a series
 _PART_OF_LAG = 3
 _LEAST = 0.05  # share of the information that is left in any direction
-_ROUNDED = 0.02  # of a step, off the next whole number of steps
 
 
 def bartlett_lag(residual: Array) -> int:
@@ -171,24 +166,3 @@ def long_run(score: Array, lag: int, starts: Index) -> Array:
         product = (score[shift:] * together[:, None]).T @ score[:-shift]
         meat += (1.0 - shift / (lag + 1.0)) * (product + product.T)
     return np.asarray(meat, dtype=np.float64)
-
-
-def noise_of(signal: Array) -> float:
-    """Standard deviation of the white noise of a signal, from high differences, which no smooth motion survives."""
-    gain = math.sqrt(float(comb(2 * _DIFFERENCES, _DIFFERENCES)))
-    return float(np.median(np.abs(np.diff(signal, _DIFFERENCES)))) / (0.6745 * gain)
-
-
-def resolution_of(signal: Array) -> float:
-    """Step of a rounded signal, 0 for one that isn't rounded: its values are whole multiples of the smallest change in it."""
-    change = np.abs(np.diff(signal))
-    change = change[change > 1e-12 * np.max(np.abs(signal), initial=0.0)]
-    if change.shape[0] < 2:
-        return 0.0
-    step = float(np.median(change[change < 1.5 * np.min(change)]))
-    count = (signal - signal[0]) / step
-    # Sharpened over the whole range, since a float holds the smallest change less well.
-    whole = np.round(count)
-    step *= float(count @ whole) / max(float(whole @ whole), 1.0)
-    off = np.abs((signal - signal[0]) / step - np.round((signal - signal[0]) / step))
-    return step if float(np.max(off)) < _ROUNDED and np.ptp(whole) > 2 else 0.0

@@ -97,18 +97,18 @@ def grid_of(time: Array) -> Grid:
     """The even grid of ``time`` [s], shape ``(n,)``, with n at least 2."""
     n = time.shape[0]
     period = _period(time)
-    number = np.arange(n, dtype=np.float64)
+    skip = np.ones(n - 1)
     if period > 0.0:
-        skip = np.ones(n - 1)
         candidates = np.flatnonzero(np.diff(time) > _LOST * period).tolist()
         for beside in _BESIDE:
-            number[1:] = np.cumsum(skip)
-            late = time - period * number
             for k in candidates:
-                left = float(np.median(late[max(k + 1 - beside, 0) : k + 1]))
-                right = float(np.median(late[k + 1 : k + 1 + beside]))
-                skip[k] = max(skip[k] + round((right - left) / period), 1)
-        number[1:] = np.cumsum(skip)
+                first, last = max(k + 1 - beside, 0), min(k + 1 + beside, n)
+                # With what is known of the losses near by, one after the other.
+                number = np.concatenate([[0.0], np.cumsum(skip[first : last - 1])])
+                late = time[first:last] - period * number
+                jump = float(np.median(late[k + 1 - first :])) - float(np.median(late[: k + 1 - first]))
+                skip[k] = max(skip[k] + round(jump / period), 1)
+    number = np.concatenate([[0.0], np.cumsum(skip)])
     slope, start = np.polyfit(number, time, 1)
     line = slope * number + start
     off = time - line
@@ -130,17 +130,17 @@ def rounded_grid(time: Array) -> tuple[Array, float] | None:
     step = np.diff(time)
     if np.any(step < 0.0) or not np.any(step > 0.0):
         return None
-    quantum = step_of(time)
-    grid = grid_of(time)
-    if quantum < _MOST_LEVELS * grid.period or float(np.max(np.abs(step - grid.period))) < _EVEN * grid.period:
+    # Of the steps, not of the stamps: these may be several roundings apart throughout.
+    fuzz = 8.0 * float(np.finfo(np.float64).eps * np.max(np.abs(time)))
+    quantum = step_of(fuzz * np.round(step / fuzz))
+    every = np.arange(time.shape[0], dtype=np.float64)
+    period, start = (float(value) for value in np.polyfit(every, time, 1))
+    if period <= 0.0 or quantum < _MOST_LEVELS * period or float(np.max(np.abs(step - period))) < _EVEN * period:
         return None
-    if (
-        grid.n_lost
-        or float(np.ptp(grid.off)) > _ROUNDED * quantum + _JITTERS * grid.period
-        or not np.all(np.diff(grid.time) > 0.0)
-    ):
+    # A lost sample or a stall shows as a step of the lateness about the line, which rounding can't make.
+    if float(np.ptp(time - start - period * every)) > _ROUNDED * quantum + _JITTERS * period:
         return None
-    return grid.time, quantum
+    return start + period * every, quantum
 
 
 def jitter_of(record: Record, grid: Grid) -> Jitter:

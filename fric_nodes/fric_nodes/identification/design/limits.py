@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...record import Record
-from ..innovations import noise_of
+from ...signals.resolution import noise_of
 
 _SHORTEST = 2.0  # [s] of a recording worth designing
 

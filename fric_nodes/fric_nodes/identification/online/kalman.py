@@ -20,8 +20,8 @@ import numpy as np
 
 from ...model import Model
 from ...record import Array, Mask
+from ...signals.resolution import noise_of
 from ..free_parameters import FreeParameters
-from ..innovations import noise_of
 from ..result import Options
 from .estimate import Estimate, State, model_with, status_of
 from .kalman_filter import AHEAD, KalmanFilter, Noise
