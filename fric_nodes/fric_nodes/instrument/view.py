@@ -124,11 +124,20 @@ class View:
         while cutoff > lowest:
             smooth = self.low_pass(self.even.position, cutoff)
             acceleration = np.gradient(np.gradient(smooth, self.h), self.h)
-            noise = self.noise * (2.0 * np.pi) ** 2 * cutoff**2.5 * np.sqrt(0.4 * self.h)
+            noise = self._acceleration_noise(cutoff)
             if noise <= _ACCELERATION_NOISE * float(np.sqrt(np.mean(acceleration**2))):
                 break
             cutoff /= _NARROWING
         return max(cutoff, lowest)
+
+    def _acceleration_noise(self, cutoff: float) -> float:
+        """Standard deviation that the position's noise gives the acceleration behind a filter to ``cutoff`` [x/s^2]."""
+        return float(self.noise * (2.0 * np.pi) ** 2 * cutoff**2.5 * np.sqrt(0.4 * self.h))
+
+    @cached_property
+    def acceleration_noise(self) -> float:
+        """Of the filtered acceleration: what noise makes of it, over its rms [1]."""
+        return self._acceleration_noise(self.cutoff) / max(float(np.sqrt(np.mean(self.acceleration**2))), 1e-300)
 
     @cached_property
     def position(self) -> Array:
