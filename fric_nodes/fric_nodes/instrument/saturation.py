@@ -33,6 +33,7 @@ _RARE = 0.4  # share of a recording up to which plateaus are a limit and not the
 _WIDENING = 1.4  # between 1 for a clipped signal and 2 for a parabola
 _STEADY = 0.08  # of the recording's high speed: change of speed within a plateau, or beside it
 _FAULT = 0.003
+_HELD = 0.1  # [s] that a force is held for, at least, when somebody wants it so
 _SURE = 4.0  # standard errors
 _OFF = 1.5  # times the imbalance elsewhere
 _OFF_SHARE = 0.015  # of the force range
@@ -149,8 +150,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     detail = f"the force stays at {levels} {view.record.units.force} {len(found)} time(s), {100 * share:.2g} % of the recording"
     wrong = sum(last - first for first, last, _ in clipped(view, found)) / view.record.n_samples
     visits = Counter(level for _, _, level in found)
-    if wrong <= _FAULT and max(visits.values()) == 1:
-        # A limit is reached again; one visit to a level is as well a force that was held there.
+    longest = max(float(time[b - 1] - time[a]) for a, b, _ in found)
+    if wrong <= _FAULT and max(visits.values()) == 1 and longest > _HELD:
+        # A limit cuts peaks off, again and again; a longer visit to a level is as well a force that was held there.
         detail += "; once at each level, which a force that was held does too, and the balance does not contradict it"
         return Finding("saturation", "unknown", detail, share, "1")
     if wrong <= _FAULT:
