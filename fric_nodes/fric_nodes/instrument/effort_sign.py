@@ -27,6 +27,11 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     mass, mass_error = side * view.balance.value("mass"), view.balance.error("mass")
     friction *= side
     interval = (friction - 1.96 * error, friction + 1.96 * error)
+    # What nothing explains may be as large as what seems to be friction: then its sign is not known either.
+    stands_out = abs(friction) > view.balance.residual
+    if friction < -_SURE * error and not mass > _SURE * mass_error and not stands_out:
+        detail = f"the balance leaves {view.balance.residual:.3g} {unit} unexplained, more than friction would be"
+        return Finding("effort_sign", "unknown", detail, friction, unit, interval, "record at a higher rate, or smoother motion")
     if friction < -_SURE * error and not mass > _SURE * mass_error:
         also = " and negative inertia" if mass < -_SURE * mass_error else ""
         detail = (

@@ -88,7 +88,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     if not evidence.friction(speed) > 0.0:
         return Finding("units", "unknown", "the model has no friction to hold against")
     mass, mass_error = view.balance.value("mass"), view.balance.error("mass")
-    seen = mass > 4.0 * mass_error and view.balance.part("mass") > 2.0 * view.balance.residual
+    seen = view.balance.shows("mass")
     by_mass = [(math.log(mass / evidence.inertia), math.hypot(mass_error / mass, _MASS_KNOWN))] if seen else []
     spread = math.hypot(error / friction, _FRICTION_KNOWN)
     effort = _mean([*by_mass, (math.log(friction / evidence.friction(speed)), spread)])

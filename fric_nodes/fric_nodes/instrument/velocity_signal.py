@@ -7,7 +7,7 @@ each shift that is whole in samples the best factor s leaves a misfit
 
 summed over the same samples t for every tau, and normalised by the energy of what was shifted: a bare correlation has its peak
 where the motion happens to be larger. Every tau with J(tau)/J_min - 1 < F/nu is as likely as the best one (likelihood ratio at
-0.1 %; nu = 2 B T independent values behind a filter to B over T). The velocity is late when no such tau lies within a few
+0.1 %; nu = 2 B T independent values behind a filter to B, T being the time in which it moves). The velocity is late when no such tau lies within a few
 samples of zero, and when it matters: the shift changes the velocity by more than a fiftieth of its rms. For a periodic motion,
 or a ramp, many tau are as likely, zero among them. The factor is judged at the lag in the same way.
 
@@ -82,7 +82,9 @@ def _shifted(view: View, recorded: Array, cutoff: float, steady: bool) -> _Shift
     # A factor of the other sign is another fault; half a period late is none.
     sign = product * (1.0 if product[reach] >= 0.0 else -1.0) > 0.0
     best = int(np.argmin(np.where(sign, share, np.inf))) if np.any(sign) else reach
-    freedom = max(2.0 * cutoff * seconds - 2.0, 3.0)
+    # Where it moves in bursts, only they count: the effective number of samples of the energy.
+    burst = power**2 / max(float(np.sum(v[use] ** 4)), 1e-300)
+    freedom = max(2.0 * cutoff * view.h * burst - 2.0, 3.0)
     limit = share[best] * (1.0 + float(stats.f.isf(_LEVEL, 1.0, freedom)) / freedom)
     return _Shifted(shifts * view.h, product / power, share, energy, best, np.flatnonzero(sign & (share <= limit)), freedom)
 

@@ -25,6 +25,8 @@ _ACCELERATION_NOISE = 0.05
 _RARER = 0.05  # share of the sliding samples, at least, in the rarer direction
 _SLIDING = 0.05  # of the recording's high speed
 _CLUSTERS = 20  # of a recording, for standard errors
+_SURE = 4.0  # standard errors
+_STANDS_OUT = 2.0  # times the residual
 _AFTER_REVERSAL = 0.03  # of a typical stroke: pre-sliding, and what a play takes
 
 
@@ -39,6 +41,7 @@ class Balance(NamedTuple):
         parts: rms of the force of each, shape ``(5,)`` [F].
         n_samples: that it was made from.
         covariance: of ``values``, shape ``(5, 5)``.
+        own: rms of the force of each that the others don't make, shape ``(5,)`` [F].
     """
 
     names: tuple[str, ...]
@@ -48,6 +51,15 @@ class Balance(NamedTuple):
     parts: Array
     n_samples: int
     covariance: Array
+    own: Array
+
+    def shows(self, name: str) -> bool:
+        """Whether ``name`` is positive beyond chance, and what only it explains stands out of what nothing explains.
+
+        In a single tone inertia and a spring are one; then a misfit of the friction curve alone makes a mass.
+        """
+        k = self.names.index(name)
+        return bool(self.values[k] > _SURE * self.errors[k] and self.own[k] > _STANDS_OUT * self.residual)
 
     def value(self, name: str) -> float:
         """The value of ``name``."""
@@ -230,7 +242,7 @@ def balance_on(view: View, at: Index) -> Balance:
     """Force balance of the samples ``at``."""
     if at.size < 40:
         nothing = np.full(5, np.nan)
-        return Balance(_NAMES, nothing, nothing, float("nan"), nothing, int(at.size), np.full((5, 5), np.nan))
+        return Balance(_NAMES, nothing, nothing, float("nan"), nothing, int(at.size), np.full((5, 5), np.nan), nothing)
     columns = _columns(view, at)
     size = np.sqrt(np.mean(columns**2, axis=0))
     size[size == 0.0] = 1.0
@@ -249,7 +261,9 @@ def balance_on(view: View, at: Index) -> Balance:
         covariance = n_clusters / (n_clusters - 5) * (inverse @ (score.T @ score) @ inverse)
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     rms = float(np.sqrt(np.mean(residual**2)))
-    return Balance(_NAMES, values / size, errors / size, rms, np.abs(values), int(at.size), covariance / np.outer(size, size))
+    own = np.abs(values) / np.sqrt(np.maximum(np.diag(inverse), 1e-300) * at.size)
+    spread = covariance / np.outer(size, size)
+    return Balance(_NAMES, values / size, errors / size, rms, np.abs(values), int(at.size), spread, own)
 
 
 def _columns(view: View, at: Index) -> Array:
