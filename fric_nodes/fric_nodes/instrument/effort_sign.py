@@ -31,7 +31,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     stands_out = abs(friction) > view.balance.residual
     if friction < -_SURE * error and not mass > _SURE * mass_error and not stands_out:
         detail = f"the balance leaves {view.balance.residual:.3g} {unit} unexplained, more than friction would be"
-        return Finding("effort_sign", "unknown", detail, friction, unit, interval, "record at a higher rate, or smoother motion")
+        return Finding(
+            "effort_sign", "unknown", detail, friction, unit, interval, "record at a higher rate, or smoother motion"
+        )
     if friction < -_SURE * error and not mass > _SURE * mass_error:
         also = " and negative inertia" if mass < -_SURE * mass_error else ""
         detail = (

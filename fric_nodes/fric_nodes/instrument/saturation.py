@@ -128,7 +128,9 @@ def clipped(view: View, found: list[Plateau]) -> list[Plateau]:
     middle = float(np.median(view.force))
     wrong = []
     for plateau, span in zip(found, spans, strict=True):
-        known = np.isfinite(left[span]) & np.isfinite(error[span]) & (view.velocity[span] >= slow) & (view.velocity[span] <= fast)
+        known = (
+            np.isfinite(left[span]) & np.isfinite(error[span]) & (view.velocity[span] >= slow) & (view.velocity[span] <= fast)
+        )
         if not np.any(known):
             continue
         # What acted was more than what was recorded.

@@ -104,7 +104,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         signal, factor = min(candidates, key=lambda each: each[1].apart)
         if factor.apart < min(_AGREE, 0.5 * plain):
             return _of(signal, factor, evidence, "the model", view)
-    detail = f"mass or friction is off the model by a factor of {math.exp(plain):.3g}, and no one factor of a signal explains both"
+    detail = (
+        f"mass or friction is off the model by a factor of {math.exp(plain):.3g}, and no one factor of a signal explains both"
+    )
     return Finding(
         "units", "warning", detail, math.exp(plain), "1", remedy="check the model's values, the units and the gear ratio"
     )

@@ -108,7 +108,9 @@ def _triangle(random: Random, travel: float, move: float) -> _Plan:
 def _steps(random: Random, travel: float, move: float) -> _Plan:
     n = int(random.integers(3, 9))
     up = np.linspace(0.0, travel, n)
-    places = np.concatenate([up, up[-2::-1]]) if random.uniform() < 0.6 else np.concatenate([[0.0], travel * random.uniform(size=n)])
+    places = (
+        np.concatenate([up, up[-2::-1]]) if random.uniform() < 0.6 else np.concatenate([[0.0], travel * random.uniform(size=n)])
+    )
     return _schedule(random, places, 2e-3, move, False)
 
 
