@@ -1,8 +1,8 @@
 """How often the checks of recordings find a moderate fault, and how often they raise a false alarm; takes some minutes.
 
 What the recordings are: :mod:`fric_nodes.instrument.trials`. A fault counts as found when its own check names it; a false
-alarm is a clean recording in which any check finds a fault. Clean recordings are of two kinds, by two simulators: those that the
-faults are put into, and ordinary tests (:mod:`fric_nodes.instrument.trials.ordinary`). Beside each share stand the counts and
+alarm is a clean recording in which any check finds a fault. Clean recordings are of two kinds, by two simulators: those that
+the faults are put into, and ordinary tests (:mod:`fric_nodes.instrument.trials.ordinary`). Beside each share stand the counts and
 Wilson's 95 % interval for the share that a larger number of recordings would show.
 """
 

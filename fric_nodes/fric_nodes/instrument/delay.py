@@ -27,6 +27,8 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     interval = (value - 1.96 * error, value + 1.96 * error)
     if lag.at_edge or abs(value) > _CREDIBLE * curves.tau[-1]:
         return Finding("delay", "unknown", f"a lag of {1e3 * value:.3g} ms fits best: not credible as a delay")
+    if 1.96 * error > _CREDIBLE * curves.tau[-1]:
+        return Finding("delay", "unknown", "any lag of the range that is looked at fits as well", value, "s", interval)
     small = abs(value) <= _SAMPLES * view.record.sample_time
     if not small and abs(value) <= 4.0 * error:
         detail = f"a lag of {1e3 * value:.3g} ms fits best, which can't be told from none ({1e3 * error:.2g} ms standard error)"

@@ -2,14 +2,14 @@
 
 The effort, shifted by tau, is fitted by what a motion needs: m a, a cubic of the position (springs, an arm's weight) and, for
 each direction, a constant, a viscous and a quadratic part and two that fade with speed. The tau that leaves least is the lag.
-Only sliding samples count, so that pre-sliding and play after a reversal, which lag behind by themselves, stay out. The sums are
-kept per window, so that a lag that grows, and intervals by the jackknife over windows, need no second pass.
+Only sliding samples count, so that pre-sliding and play after a reversal, which lag behind by themselves, stay out. The sums
+are kept per window, so that a lag that grows, and intervals by the jackknife over windows, need no second pass.
 
 What can shift is the inertial force alone: any force of position and speed may have another shape than was thought. So the part
 of the acceleration that no function of position and speed makes has to stand out of the residual. In a single tone, a ramp, or
 moves at one speed there is none, and no lag can be told. And a controller answers to the noise of the position, which the
 acceleration has too: the two seem shifted. What that can make is the noise's share of the acceleration, times the inertial
-force. An effect below twice that, or below what matters, can't be told either.
+force. An effect below that, at 95 %, or below what matters, can't be told either.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 __all__ = ["MATTERS", "Growth", "Lag", "LagCurves", "judged"]
 
 MATTERS = 0.01
-"""Of the effort's standard deviation: a third of what friction models leave of a real axis at best. A smaller effect can't be told."""
+"""Of the effort's standard deviation: a third of what friction models leave of a real axis at best. Less can't be told."""
 
+_SURE = 1.645  # quantile of 95 %, one-sided
 _WINDOWS = 16
 _RANGE = 0.1  # [s]
 _LEAST_RANGE = 6  # steps of the grid
@@ -160,7 +161,7 @@ class LagCurves:
 
     def _least_effect(self, inertia: float) -> float:
         """What has to be exceeded, with an inertial force of its own of ``inertia`` [F]."""
-        return max(MATTERS, 2.0 * self.noise * abs(inertia) / max(self.spread, 1e-300))
+        return max(MATTERS, _SURE * self.noise * abs(inertia) / max(self.spread, 1e-300))
 
     def _own_inertia(self, xx: Array, xu: Array) -> float:
         """Rms of the force of the acceleration's part that the other columns don't make [F], with the sign of the mass."""

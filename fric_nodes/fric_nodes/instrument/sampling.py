@@ -3,8 +3,8 @@
 Every other sample is left out and put back by the cubic through its four neighbours. For a motion of angular frequency w that
 errs by about 0.375 (w h)^3 of a step between samples, so that the error tells how many samples a period of the fastest motion
 has: the value. Noise errs too, but as much when every second sample is missing altogether, where a motion's error grows
-sixteenfold. Where the force jumps, the acceleration does, and the cubic errs there at whatever rate; but only at the few samples
-that have the jump among their neighbours. So error and step are taken as medians over twice as many samples.
+sixteenfold. Where the force jumps, the acceleration does, and the cubic errs there at whatever rate; but only at the few
+samples that have the jump among their neighbours. So error and step are taken as medians over twice as many samples.
 """
 
 from __future__ import annotations

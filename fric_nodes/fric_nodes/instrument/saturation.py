@@ -106,8 +106,8 @@ def clipped(view: View, found: list[Plateau]) -> list[Plateau]:
     """Those of ``found`` at which the force recorded isn't the one that acted.
 
     What was recorded has to fall short of what the balance of all other samples asks for there, by more than the balance leaves
-    elsewhere and by more than its own standard error there. Only speeds that occur elsewhere too are judged: inertia is linear in
-    the acceleration, friction need not be so in the speed.
+    elsewhere and by more than its own standard error there. Only speeds that occur elsewhere too are judged: inertia is linear
+    in the acceleration, friction need not be so in the speed.
     """
     if not found:
         return []

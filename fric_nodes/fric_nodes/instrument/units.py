@@ -2,8 +2,8 @@
 
 With the position recorded s times too large, the mass seems s times too small, and the model's friction is to be taken at the
 true speed v/s; with the effort g times too large all forces are. The factor is estimated, and not picked from a list: log g is
-the mean of what mass and friction say, each weighted by its variance (its standard error, and how well a model's value is known),
-with a 95 % interval. A known factor is named only where it lies inside that interval. Mass and friction have to agree; without
+the mean of what mass and friction say, each weighted by its variance (its standard error, and how well a model's value is
+known), with a 95 % interval. A known factor is named only where it lies inside that interval. Mass and friction have to agree; without
 a mass that shows, friction alone must be far off. Without a model, a reference tells the unit of the position relative to its
 own: the factor lies between the two regressions, of either signal on the other.
 """
@@ -104,9 +104,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         signal, factor = min(candidates, key=lambda each: each[1].apart)
         if factor.apart < min(_AGREE, 0.5 * plain):
             return _of(signal, factor, evidence, "the model", view)
-    detail = (
-        f"mass or friction is off the model by a factor of {math.exp(plain):.3g}, and no one factor of a signal explains both"
-    )
+    detail = f"mass or friction is off the model by a factor of {math.exp(plain):.3g}, and no one factor explains both"
     return Finding(
         "units", "warning", detail, math.exp(plain), "1", remedy="check the model's values, the units and the gear ratio"
     )

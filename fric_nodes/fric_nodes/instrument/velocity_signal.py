@@ -7,8 +7,8 @@ each shift that is whole in samples the best factor s leaves a misfit
 
 summed over the same samples t for every tau, and normalised by the energy of what was shifted: a bare correlation has its peak
 where the motion happens to be larger. Every tau with J(tau)/J_min - 1 < F/nu is as likely as the best one (likelihood ratio at
-0.1 %; nu = 2 B T independent values behind a filter to B, T being the time in which it moves). The velocity is late when no such tau lies within a few
-samples of zero, and when it matters: the shift changes the velocity by more than a fiftieth of its rms. For a periodic motion,
+0.1 %; nu = 2 B T independent values behind a filter to B, T the time in which it moves). The velocity is late when no such
+tau lies within a few samples of zero, and when it matters: the shift changes the velocity by more than a fiftieth of its rms. For a periodic motion,
 or a ramp, many tau are as likely, zero among them. The factor is judged at the lag in the same way.
 
 Fits take the derivative of the position, so that a wrong velocity does no harm there, but tells of a unit or a filter that
@@ -43,7 +43,7 @@ _PERIODS = 4.0  # of the filter's cutoff, at least, that have to be left
 
 
 class _Shifted(NamedTuple):
-    """Sums over the samples compared, for every shift: factor, misfit J, energy; and the best, least and greatest likely lag."""
+    """Sums over the samples compared, for every shift: factor, misfit J, energy; the best, and all as likely ones."""
 
     tau: Array
     factor: Array
@@ -150,7 +150,9 @@ def _late(found: _Shifted) -> Finding:
         lag += float(0.5 * (before - after) / bend * step) if bend > 0.0 else 0.0
     detail = f"the velocity comes {1e3 * abs(lag):.3g} ms {'after' if lag > 0 else 'before'} the derivative of the position"
     if low < 0.0 < high:
-        detail = "the velocity is shifted against the derivative of the position; its motion repeats itself: by how much can't be told"
+        detail = (
+            "the velocity is shifted against the derivative of the position; the motion repeats itself: by how much is open"
+        )
     remedy = "it is filtered or stamped late: don't use it with this position; fits use the position's derivative"
     return Finding("velocity_signal", "warning", detail, lag, "s", (low, high), remedy)
 

@@ -1,12 +1,12 @@
 """Whether what a friction curve leaves is scatter from run to run, or hangs on the speed.
 
-Scatter does not know the speed of its neighbours. Two statistics of the weighted residuals r, per direction in the order of speed:
+Scatter does not know the speed of its neighbours. Two statistics of the weighted residuals r, per direction in order of speed:
 
-    R = sum (r_{k+1} - r_k)^2      (von Neumann's ratio, up to the variance): small where neighbouring speeds have alike residuals;
+    R = sum (r_{k+1} - r_k)^2      (von Neumann's ratio, but for the variance): small where neighbours are alike;
     P = |sum r_k(+v) r_k(-v)|       large where both directions are alike, or opposite, at one speed.
 
-Their distribution without structure is drawn by exchanging the runs of each direction, so that nothing is assumed of that of the
-scatter. A curve that leaves such a residual has another shape than the law, in the range of speeds where it sits: what a larger
+Their distribution without structure is drawn by exchanging the runs of each direction, so that nothing is assumed of that of
+the scatter. A curve that leaves such a residual has another shape than the law, in the range of speeds where it sits: what a larger
 tau beside the errors would hide.
 
 Source: von Neumann 1941; permutation null as in Good, Permutation, Parametric and Bootstrap Tests of Hypotheses, 2005.

@@ -4,8 +4,8 @@ Each fault says which check must find it, and with which verdicts it counts as f
 force, a filtered velocity, a vibration) is a warning by design. What acts on the axis itself (a limit, an end stop) is
 simulated; the rest is done to the recording. Only motions are drawn that can show the fault: a delay does not show in a slow
 triangle, and no check claims it would. Whether one can is told by the truth, not by the check: a shift of the effort has to
-change the inertial force by a tenth of the effort, a limit has to be reached more than once, and where friction is hidden inertia
-has to be left. Where it can't, another recording is drawn.
+change the inertial force by a tenth of the effort, a limit has to be reached more than once, and where friction is hidden
+inertia has to be left. Where it can't, another recording is drawn.
 """
 
 from __future__ import annotations
