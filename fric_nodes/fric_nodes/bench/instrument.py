@@ -2,8 +2,8 @@
 
 What the recordings are: :mod:`fric_nodes.instrument.trials`. A fault counts as found when its own check names it; a false
 alarm is a clean recording in which any check finds a fault. Clean recordings are of two kinds, by two simulators: those that
-the faults are put into, and ordinary tests (:mod:`fric_nodes.instrument.trials.ordinary`). Beside each share stand the counts and
-Wilson's 95 % interval for the share that a larger number of recordings would show.
+the faults are put into, and ordinary tests (:mod:`fric_nodes.instrument.trials.ordinary`). Beside each share stand the counts
+and Wilson's 95 % interval for the share that a larger number of recordings would show.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     mass, mass_error = side * view.balance.value("mass"), view.balance.error("mass")
     friction *= side
     interval = (friction - 1.96 * error, friction + 1.96 * error)
-    # Samples too far apart for the force make a balance of their own: then inertia has to say the same, or friction has to stand
+    # Samples too far apart for the force make a balance of their own: inertia has to say the same, or friction has to stand
     # out of what nothing explains by an order of magnitude.
     stands_out = mass < -_SURE * mass_error or abs(friction) > _ORDER * view.balance.residual
     if friction < -_SURE * error and not mass > _SURE * mass_error and not stands_out:

@@ -4,11 +4,11 @@ Harder than the force that moved it outward anywhere, less inertia, the moments 
 spring that the rest of the recording shows would explain. A joint that was brought to rest there by its controller, or is
 held against a spring, is at no stop: it must have been stopped abruptly, or take a force that changes without giving way.
 
-Nor is a joint that is held against gravity, which may be heavier there than anywhere else. A joint that friction F holds rests
-under any force from R to R + 2 F, R being the force under which it moves back from that place: gravity and friction are the
-same then. So a stop is where the push exceeds R by more than sliding and break-away force together. Where the reference goes
-no farther than the joint, it was held. Where the joint never comes back and no reference was recorded, that can't be told, and nothing is left out.
-The value is the time spent at stops.
+Nor is a joint that is held against gravity, which may be heavier there than anywhere else. A joint that friction F holds
+rests under any force from R to R + 2 F, R being the force under which it moves back from that place: gravity and friction are
+the same then. So a stop is where the push exceeds R by more than sliding and break-away force together. Where the reference
+goes no farther than the joint, it was held. Where the joint never comes back and no reference was recorded, that can't be
+told, and nothing is left out. The value is the time spent at stops.
 """
 
 from __future__ import annotations

@@ -166,7 +166,7 @@ class LagCurves:
     def _own_inertia(self, xx: Array, xu: Array) -> float:
         """Rms of the force of the acceleration's part that the other columns don't make [F], with the sign of the mass."""
         inverse = np.linalg.pinv(xx, rcond=1e-9, hermitian=True)
-        return float((inverse @ xu)[0]) / np.sqrt(max(float(inverse[0, 0]), 1e-300) * self.n_samples)
+        return float((inverse @ xu)[0]) / float(np.sqrt(max(float(inverse[0, 0]), 1e-300) * self.n_samples))
 
     @lru_cache(maxsize=1)  # noqa: B019 - as above
     def growing(self) -> Growth:

@@ -5,11 +5,12 @@ each shift that is whole in samples the best factor s leaves a misfit
 
     J(tau) = sum w(t + tau)^2 - (sum v(t) w(t + tau))^2 / sum v(t)^2 ,
 
-summed over the same samples t for every tau, and normalised by the energy of what was shifted: a bare correlation has its peak
-where the motion happens to be larger. Every tau with J(tau)/J_min - 1 < F/nu is as likely as the best one (likelihood ratio at
-0.1 %; nu = 2 B T independent values behind a filter to B, T the time in which it moves). The velocity is late when no such
-tau lies within a few samples of zero, and when it matters: the shift changes the velocity by more than a fiftieth of its rms. For a periodic motion,
-or a ramp, many tau are as likely, zero among them. The factor is judged at the lag in the same way.
+summed over the same samples t for every tau, and normalised by the energy of what was shifted: a bare correlation has its
+peak where the motion happens to be larger. Every tau with J(tau)/J_min - 1 < F/nu is as likely as the best one (likelihood
+ratio at 0.1 %; nu = 2 B T independent values behind a filter to B, T the time in which it moves). The velocity is late when
+no such tau lies within a few samples of zero, and when it matters: the shift changes the velocity by more than a fiftieth of
+its rms. For a periodic motion, or a ramp, many tau are as likely, zero among them. The factor is judged at the lag in the
+same way.
 
 Fits take the derivative of the position, so that a wrong velocity does no harm there, but tells of a unit or a filter that
 other signals may share.
@@ -23,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from ..record import Array
+from ..record import Array, Index
 from .check import Check, Correction, Evidence, Finding, each
 from .units import named
 from .view import View
@@ -50,7 +51,7 @@ class _Shifted(NamedTuple):
     misfit: Array
     energy: Array
     best: int
-    likely: Array
+    likely: Index
     freedom: float
 
 
@@ -74,7 +75,7 @@ def _shifted(view: View, recorded: Array, cutoff: float, steady: bool) -> _Shift
         return np.asarray(product[shifts % size])
 
     power = float(np.sum(v[use] ** 2))
-    energy = np.maximum(over(use * 1.0, w**2), 1e-300)
+    energy = np.maximum(over(np.asarray(use, dtype=np.float64), w**2), 1e-300)
     product = over(np.where(use, v, 0.0), w)
     # Rounding of the transform: an exact velocity would leave less.
     misfit = np.maximum(energy - product**2 / power, 1e-10 * energy)
@@ -86,7 +87,9 @@ def _shifted(view: View, recorded: Array, cutoff: float, steady: bool) -> _Shift
     burst = power**2 / max(float(np.sum(v[use] ** 4)), 1e-300)
     freedom = max(2.0 * cutoff * view.h * burst - 2.0, 3.0)
     limit = share[best] * (1.0 + float(stats.f.isf(_LEVEL, 1.0, freedom)) / freedom)
-    return _Shifted(shifts * view.h, product / power, share, energy, best, np.flatnonzero(sign & (share <= limit)), freedom)
+    return _Shifted(
+        np.asarray(shifts * view.h), product / power, share, energy, best, np.flatnonzero(sign & (share <= limit)), freedom
+    )
 
 
 def _judge(view: View, evidence: Evidence) -> Finding:

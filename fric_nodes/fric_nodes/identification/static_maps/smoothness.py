@@ -6,8 +6,8 @@ Scatter does not know the speed of its neighbours. Two statistics of the weighte
     P = |sum r_k(+v) r_k(-v)|       large where both directions are alike, or opposite, at one speed.
 
 Their distribution without structure is drawn by exchanging the runs of each direction, so that nothing is assumed of that of
-the scatter. A curve that leaves such a residual has another shape than the law, in the range of speeds where it sits: what a larger
-tau beside the errors would hide.
+the scatter. A curve that leaves such a residual has another shape than the law, in the range of speeds where it sits: what a
+larger tau beside the errors would hide.
 
 Source: von Neumann 1941; permutation null as in Good, Permutation, Parametric and Bootstrap Tests of Hypotheses, 2005.
 """

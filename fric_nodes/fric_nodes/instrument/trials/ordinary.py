@@ -1,10 +1,10 @@
 """Clean recordings of ordinary tests: ramps, steps, sines, moves, holds against gravity, one direction, short ones.
 
-A body with friction, stepped after Moreau: with the free velocity v* = v + h/m (u - c v - G(q)), the friction force is the one
-that brings it to rest, at most F(v) = F_C + F_S exp(-(v/v_S)^2). G is a constant (a vertical axis) or G sin q (an arm). It
-shares no code with :mod:`fric_nodes.simulate`. Each seed draws the axis, the motion, the controller (PD or PID, its own rate,
-with or without the gravity's force known), the encoder, the force signal (command or measurement, noise, steps), and which signals
-are recorded. Nothing is wrong with any of these recordings: a fault that a check finds in one is a false one.
+A body with friction, stepped after Moreau: with the free velocity v* = v + h/m (u - c v - G(q)), the friction force is the
+one that brings it to rest, at most F(v) = F_C + F_S exp(-(v/v_S)^2). G is a constant (a vertical axis) or G sin q (an arm).
+It shares no code with :mod:`fric_nodes.simulate`. Each seed draws the axis, the motion, the controller (PD or PID, its own
+rate, with or without the gravity's force known), the encoder, the force signal (command or measurement, noise, steps), and
+which signals are recorded. Nothing is wrong with any of these recordings: a fault that a check finds in one is a false one.
 """
 
 from __future__ import annotations
@@ -102,7 +102,9 @@ def _ramp(random: Random, travel: float, move: float) -> _Plan:
 
 
 def _triangle(random: Random, travel: float, move: float) -> _Plan:
-    return _schedule(random, travel * (np.arange(int(random.integers(4, 10))) % 2), move, 0.0, False)
+    return _schedule(
+        random, np.asarray(travel * (np.arange(int(random.integers(4, 10))) % 2), dtype=np.float64), move, 0.0, False
+    )
 
 
 def _steps(random: Random, travel: float, move: float) -> _Plan:
@@ -127,7 +129,7 @@ def _point_to_point(random: Random, travel: float, move: float) -> _Plan:
 
 
 def _two_places(random: Random, travel: float, move: float) -> _Plan:
-    places = travel * (np.arange(int(random.integers(3, 9))) % 2)
+    places = np.asarray(travel * (np.arange(int(random.integers(3, 9))) % 2), dtype=np.float64)
     return _schedule(random, places, move, float(random.uniform(0.3, 3.0)) * move, random.uniform() < 0.7)
 
 
