@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from fric_nodes.instrument import CHECKS, Evidence
 from fric_nodes.instrument.trials.faults import FAULTS, Fault
-from fric_nodes.instrument.trials.score import false_alarms
+from fric_nodes.instrument.trials.score import false_alarms, ordinary_alarms
 
 
 def test_every_check_that_a_recording_alone_can_fail_has_a_fault() -> None:
@@ -22,3 +22,16 @@ def test_the_fault_is_found(fault: Fault) -> None:
 def test_clean_recordings_raise_no_alarm() -> None:
     wrong, _ = false_alarms(range(30_000, 30_012))
     assert [(seed, finding.check, finding.detail) for seed, finding in wrong] == []
+
+
+def test_ordinary_recordings_have_no_fault() -> None:
+    said = ordinary_alarms(range(30_000, 30_042))  # every kind three times
+    assert said.faults == ()
+    # A false warning in one of ten would be many.
+    assert sum(said.warnings.values()) < 0.2 * said.trials
+
+
+@pytest.mark.long
+def test_more_ordinary_recordings_have_hardly_a_fault() -> None:
+    said = ordinary_alarms(range(31_000, 31_280))
+    assert said.wrong <= 0.01 * said.trials, said.faults

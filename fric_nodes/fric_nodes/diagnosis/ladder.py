@@ -21,6 +21,7 @@ from ..identification.result import Options
 from ..identification.static_map import curve_terms, settled_means
 from ..identification.static_maps.curve import STRIBECK_LAWS, Candidate, Choice, Curve, Points, choose, fitted
 from ..identification.static_maps.load import MeanForce
+from ..identification.static_maps.smoothness import structure_of
 from ..identification.static_maps.weighted import as_normal
 from ..instrument import Finding as Check
 from ..model import Model, Term
@@ -36,10 +37,7 @@ _FEWEST_SPEEDS = 4
 _ONE_WAY = 0.05  # of the way, beyond its ends
 _SETTLED = 0.75  # of the recordings, at least
 _ENERGY = 0.8  # of what is missing, by the range of speeds named
-_DRAWS = 1999
-_SIGNIFICANT = 0.01
 _MOST = 0.99  # sure of anything
-_SAME_SPEED = 0.1
 _FLAGS = {"viscous": "viscous", "stribeck": "stribeck", "quadratic_drag": "quadratic", "asymmetry": "asymmetry"}
 
 
@@ -157,39 +155,6 @@ def _rival(choice: Choice, base: Candidate, best: Candidate, effect: str) -> Run
     return None
 
 
-def _structured(points: Points, left: Array) -> str:
-    """In what way that which is left hangs on the speed, as no scatter from run to run does; ``""`` where it doesn't.
-
-    Two tests: von Neumann's ratio (neighbouring speeds alike) and the product over both directions at one speed, their
-    distributions drawn by exchanging the runs of each direction.
-    """
-    rng = np.random.default_rng(1)
-    white = left / np.sqrt(points.error**2 + float(np.var(left)))
-    speed = np.abs(points.velocity)
-    ways = [np.flatnonzero(way)[np.argsort(speed[way])] for way in (points.velocity > 0.0, points.velocity < 0.0)]
-    pairs = [(k, j) for k in ways[0] for j in ways[1] if abs(speed[j] - speed[k]) < _SAME_SPEED * speed[k]]
-    ahead, back = (np.array([pair[side] for pair in pairs], dtype=np.int64) for side in (0, 1))
-
-    def rough(values: Array) -> float:
-        return sum(float(np.sum(np.diff(values[way]) ** 2)) for way in ways)
-
-    def mirrored(values: Array) -> float:
-        return -abs(float(values[ahead] @ values[back]))
-
-    drawn = []
-    for _ in range(_DRAWS):
-        values = white.copy()
-        for way in ways:
-            values[way] = white[rng.permutation(way)]
-        drawn.append((rough(values), mirrored(values)))
-    by_chance = (1 + np.sum(np.array(drawn) <= np.array([rough(white), mirrored(white)]), axis=0)) / (1 + _DRAWS)
-    if by_chance[0] < 0.5 * _SIGNIFICANT:
-        return "what is left at neighbouring speeds is alike"
-    if len(pairs) >= _FEWEST_SPEEDS and by_chance[1] < 0.5 * _SIGNIFICANT:
-        return "what is left at one speed hangs together in both directions"
-    return ""
-
-
 def _where(
     energy: Array, means: Sequence[MeanForce], spans: dict[str, tuple[float, float]], order: list[str], unit: str
 ) -> Where:
@@ -283,13 +248,13 @@ def concluded_by_means(
         "every recording is at one speed: the means of the runs were compared, not their samples",
         *ladder.notes,
     ]
-    if best.scatter > 2.0 * float(np.median(points.error)):
+    why = structure_of(points.velocity, points.force - best.force(points.velocity), points.error).why
+    if best.scatter > 2.0 * float(np.median(points.error)) and not why:
         notes.append(
             f"the means scatter by {best.scatter:.2g} {nominal.units.force} from run to run, beyond their own errors of "
             f"{float(np.median(points.error)):.2g} {nominal.units.force}: temperature, lubricant or the place, "
             "which constant speeds don't tell"
         )
-    why = _structured(points, points.force - best.force(points.velocity))
     if why:
         why += ", which chance does in less than one of a hundred: friction depends on speed in a way that no curve here has"
     if why and rest <= UNEXPLAINED:

@@ -197,7 +197,7 @@ class Diagnosis:
         if not self.mismatch and self.by_means:
             return (
                 f"No term of the friction curve is missing: the refitted one leaves an NOE of {v.noe_refit:.3g} % of the "
-                f"means, of which {v.noise_floor:.3g} % are their own errors and the rest scatters from run to run."
+                f"means, of which {v.noise_floor:.3g} % are their own errors; the rest scatters and does not hang on the speed."
             )
         if not self.mismatch:
             return (

@@ -31,6 +31,11 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     if not mass > _SURE * mass_error:
         return Finding("compensated_drive", "unknown", "inertia does not show, so that friction has nothing to be held against")
     remedy = "switch the drive's own friction compensation off, or record the current that it really gives"
+    if friction < -_SURE * error and abs(friction) <= view.balance.residual:
+        detail = (
+            f"the balance leaves {view.balance.residual:.3g} {view.record.units.force} unexplained, more than friction would be"
+        )
+        return Finding("compensated_drive", "unknown", detail, friction, view.record.units.force)
     if friction < -_SURE * error:
         detail = f"inertia is right, but friction is negative ({friction:.3g}): the drive adds more than friction takes"
         return Finding("compensated_drive", "fault", detail, friction, view.record.units.force, remedy=remedy)

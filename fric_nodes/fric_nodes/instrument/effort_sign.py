@@ -15,6 +15,7 @@ from .view import View, friction_along
 __all__ = ["CHECK"]
 
 _SURE = 4.0
+_ORDER = 10.0
 
 
 def _judge(view: View, evidence: Evidence) -> Finding:
@@ -27,6 +28,14 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     mass, mass_error = side * view.balance.value("mass"), view.balance.error("mass")
     friction *= side
     interval = (friction - 1.96 * error, friction + 1.96 * error)
+    # Samples too far apart for the force make a balance of their own: inertia has to say the same, or friction has to stand
+    # out of what nothing explains by an order of magnitude.
+    stands_out = mass < -_SURE * mass_error or abs(friction) > _ORDER * view.balance.residual
+    if friction < -_SURE * error and not mass > _SURE * mass_error and not stands_out:
+        detail = f"the balance leaves {view.balance.residual:.3g} {unit} unexplained, too much for a sign to be told"
+        return Finding(
+            "effort_sign", "unknown", detail, friction, unit, interval, "record at a higher rate, or smoother motion"
+        )
     if friction < -_SURE * error and not mass > _SURE * mass_error:
         also = " and negative inertia" if mass < -_SURE * mass_error else ""
         detail = (

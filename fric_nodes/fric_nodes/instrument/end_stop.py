@@ -2,8 +2,13 @@
 
 Harder than the force that moved it outward anywhere, less inertia, the moments before it broke away included, and than the
 spring that the rest of the recording shows would explain. A joint that was brought to rest there by its controller, or is
-held against a spring, is at no stop: it must have been stopped abruptly, or take a force that changes without giving way. The
-value is the time spent at stops.
+held against a spring, is at no stop: it must have been stopped abruptly, or take a force that changes without giving way.
+
+Nor is a joint that is held against gravity, which may be heavier there than anywhere else. A joint that friction F holds
+rests under any force from R to R + 2 F, R being the force under which it moves back from that place: gravity and friction are
+the same then. So a stop is where the push exceeds R by more than sliding and break-away force together. Where the reference
+goes no farther than the joint, it was held. Where the joint never comes back and no reference was recorded, that can't be
+told, and nothing is left out. The value is the time spent at stops.
 """
 
 from __future__ import annotations
@@ -26,6 +31,9 @@ _STANDS = 0.02  # of the high speed
 _NEAR = 0.002  # of the travel
 _HARDER = 0.1  # of the force range
 _CHANGES = 0.3  # of the force range, within a stand
+_BREAKS = 1.5  # break-away force over sliding friction, at most
+_RETURNS = 0.05  # [s] over which the force of the motion back is taken
+_FOLLOWS = 3.0  # times the usual distance to the reference
 _ABRUPT = 0.15  # of the high speed, lost within a few samples before a stand
 
 
@@ -82,13 +90,38 @@ def _inertial(view: View) -> tuple[float, Array]:
 
 def stops(view: View) -> list[Stop]:
     """Where the joint of ``view`` stands at a stop."""
+    return _stands(view)[0]
+
+
+def _held(view: View, stand: slice, outward: float, near: float) -> bool | None:
+    """Whether the reference goes no farther out than the joint stands; None where there is none, or it is not much farther."""
+    reference = view.record.reference
+    if reference is None:
+        return None
+    off = outward * (reference - view.record.position)
+    usual = float(np.median(np.abs(off)))
+    beyond = float(np.median(off[stand]))
+    return True if beyond <= max(near, usual) else None if beyond <= _FOLLOWS * usual else False
+
+
+def _back(against: Array, back: Mask, last: int, step: float) -> float | None:
+    """Outward force under which it moves back for the first time after ``last`` [F]; None where it never does."""
+    later = np.flatnonzero(back[last:])
+    if later.size == 0:
+        return None
+    first = last + int(later[0])
+    return float(np.median(against[first : first + max(round(_RETURNS / step), 1)]))
+
+
+def _stands(view: View) -> tuple[list[Stop], list[Stop]]:
+    """Where the joint of ``view`` stands at a stop; and where it may."""
     record = view.record
     position, time = record.position, record.time
     side, inertial = _inertial(view)
     effort = side * record.effort
     travel, spread = float(np.ptp(position)), float(np.ptp(effort))
     if travel == 0.0 or spread == 0.0 or not view.moves:
-        return []
+        return [], []
     step = record.sample_time
     velocity = _speed(position, time, step, _SLOPE_TIME)
     quick = _speed(position, time, step, 0.2 * _SLOPE_TIME)
@@ -96,7 +129,10 @@ def stops(view: View) -> list[Stop]:
     limit = _STANDS * high
     near = max(_NEAR * travel, 1.5 * view.resolution)
     slow = np.abs(velocity) <= max(limit, 1.5 * view.resolution / _SLOPE_TIME)
-    found = []
+    friction = max(float(np.nan_to_num(friction_along(view)[0])) * side, 0.0)
+    unsure = 2.0 * float(np.nan_to_num(view.balance.residual))
+    found: list[Stop] = []
+    unclear: list[Stop] = []
     for outward, end, name in ((-1.0, float(np.min(position)), "lowest"), (1.0, float(np.max(position)), "highest")):
         there = np.abs(position - end) < near
         moving = velocity * outward > limit
@@ -120,9 +156,16 @@ def stops(view: View) -> list[Stop]:
             before = slice(max(first - round(2.0 * _SLOPE_TIME / step), 0), first + 1)
             abrupt = float(np.max(outward * quick[before])) > _ABRUPT * high and _hard(outward * quick, before, high)
             changes = float(np.ptp(effort[first:last])) > _CHANGES * spread
-            if abrupt or changes:
-                found.append(Stop(first, last, end, name, side * outward * float(np.max(outward * effort[first:last]))))
-    return found
+            held = _held(view, slice(first, last), outward, near)
+            if held or not (abrupt or changes):
+                continue
+            stop = Stop(first, last, end, name, side * outward * float(np.max(outward * effort[first:last])))
+            force = _back(against, velocity * outward < -limit, last, step)
+            if force is None and held is None:
+                unclear.append(stop)
+            elif force is None or most > force + (1.0 + _BREAKS) * friction + unsure:
+                found.append(stop)
+    return found, unclear
 
 
 def _hard(speed: Array, before: slice, high: float) -> bool:
@@ -135,7 +178,11 @@ def _hard(speed: Array, before: slice, high: float) -> bool:
 def _judge(view: View, evidence: Evidence) -> Finding:
     if not view.moves:
         return Finding("end_stop", "unknown", "it does not move")
-    found = stops(view)
+    found, unclear = _stands(view)
+    if not found and unclear:
+        places = ", ".join(f"{stop.position:.4g}" for stop in {stop.end: stop for stop in unclear}.values())
+        detail = f"it stands at {places} {view.record.units.position} under a force until the end: at a stop, or held there"
+        return Finding("end_stop", "unknown", detail, remedy="record the reference, and the way back")
     if not found:
         return Finding("end_stop", "ok", "it stands nowhere against a push that would move it elsewhere", 0.0, "s")
     time, units = view.record.time, view.record.units

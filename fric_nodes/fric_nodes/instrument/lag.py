@@ -1,9 +1,15 @@
 """Lag of the effort against the motion, constant and growing, from the force balance alone.
 
-The effort, shifted by tau, is fitted by what a motion needs: m a + k q + b and, for each direction, a constant, a viscous part
-and one that fades with speed. The tau that leaves least is the lag. Only sliding samples count, so that pre-sliding and play
-after a reversal, which lag behind by themselves, stay out. The sums are kept per window, so that a lag that grows, and
-intervals by the jackknife over windows, need no second pass.
+The effort, shifted by tau, is fitted by what a motion needs: m a, a cubic of the position (springs, an arm's weight) and, for
+each direction, a constant, a viscous and a quadratic part and two that fade with speed. The tau that leaves least is the lag.
+Only sliding samples count, so that pre-sliding and play after a reversal, which lag behind by themselves, stay out. The sums
+are kept per window, so that a lag that grows, and intervals by the jackknife over windows, need no second pass.
+
+What can shift is the inertial force alone: any force of position and speed may have another shape than was thought. So the part
+of the acceleration that no function of position and speed makes has to stand out of the residual. In a single tone, a ramp, or
+moves at one speed there is none, and no lag can be told. And a controller answers to the noise of the position, which the
+acceleration has too: the two seem shifted. What that can make is the noise's share of the acceleration, times the inertial
+force. An effect below that, at 95 %, or below what matters, can't be told either.
 """
 
 from __future__ import annotations
@@ -20,8 +26,12 @@ from ..record import Array, Index
 if TYPE_CHECKING:
     from .view import View
 
-__all__ = ["Growth", "Lag", "LagCurves", "judged"]
+__all__ = ["MATTERS", "Growth", "Lag", "LagCurves", "judged"]
 
+MATTERS = 0.01
+"""Of the effort's standard deviation: a third of what friction models leave of a real axis at best. Less can't be told."""
+
+_SURE = 1.645  # quantile of 95 %, one-sided
 _WINDOWS = 16
 _RANGE = 0.1  # [s]
 _LEAST_RANGE = 6  # steps of the grid
@@ -29,6 +39,7 @@ _MOST_RANGE = 80
 _SPAN = 0.1  # [s] longest growth over a recording that is looked for
 _CONTRAST = 6.0  # energy at a typical shift over the least
 _INERTIA = 3.0  # rms of the inertial force over the residual's, at least
+_FADING = (0.03, 0.2)  # of the high speed, at which parts of friction have fallen to half
 _PER_BAND = 10.0  # steps of the grid per period of the cutoff
 
 
@@ -43,7 +54,9 @@ class Lag:
         at_edge: whether it lies at the edge of what was looked for.
         residual: rms [F].
         contrast: energy at a typical shift over the least.
-        inertia: rms of the inertial force at this lag over the residual's.
+        inertia: rms of the inertial force that only the acceleration explains, at this lag, over the residual's.
+        effect: rms of what is explained better than without it, over the effort's standard deviation.
+        least: effect that it takes to be told.
     """
 
     value: float
@@ -53,6 +66,8 @@ class Lag:
     residual: float
     contrast: float
     inertia: float
+    effect: float
+    least: float
 
 
 @dataclass(frozen=True)
@@ -64,7 +79,9 @@ class Growth:
         error: its standard error [s/s].
         start: lag at the start of the recording [s].
         left: share of the energy after a constant lag that it leaves.
-        inertia: rms of the inertial force over the residual's.
+        inertia: as in :class:`Lag`.
+        effect: as there, beside a constant lag.
+        least: as there.
     """
 
     value: float
@@ -72,6 +89,8 @@ class Growth:
     start: float
     left: float
     inertia: float
+    effect: float
+    least: float
 
 
 class LagCurves:
@@ -98,6 +117,8 @@ class LagCurves:
         bounds = np.linspace(0, keep.size, _WINDOWS + 1).astype(np.int64)
         self.enough = keep.size > 8 * columns.shape[1] + 10 * _WINDOWS
         self.n_samples = int(keep.size)
+        self.noise = view.acceleration_noise
+        self.spread = float(np.std(effort[keep])) if keep.size else 0.0
         if not self.enough:
             return
         self.time = np.array([float(np.mean(at[keep[a:b]])) * view.h for a, b in pairwise(bounds.tolist())])
@@ -128,11 +149,24 @@ class LagCurves:
         at_edge = abs(best) > self.tau[-1] - 1.5 * self.step
         residual = float(np.sqrt(max(lowest, 0.0) / self.n_samples))
         k = int(np.argmin(curve))
-        values = np.linalg.pinv(self.xx.sum(axis=0), rcond=1e-9, hermitian=True) @ self.xu.sum(axis=0)[:, k]
+        inertia = self._own_inertia(self.xx.sum(axis=0), self.xu.sum(axis=0)[:, k])
         contrast = float(np.median(curve)) / max(lowest, 1e-300)
-        return Lag(
-            best, error, lowest / max(zero, 1e-300), at_edge, residual, contrast, float(values[0]) / max(residual, 1e-300)
-        )
+        effect, least = self._effect(zero, lowest), self._least_effect(inertia)
+        left, inertia = lowest / max(zero, 1e-300), inertia / max(residual, 1e-300)
+        return Lag(best, error, left, at_edge, residual, contrast, inertia, effect, least)
+
+    def _effect(self, before: float, after: float) -> float:
+        """Rms by which the residual's energy falls, over the effort's standard deviation."""
+        return float(np.sqrt(max(before - after, 0.0) / self.n_samples)) / max(self.spread, 1e-300)
+
+    def _least_effect(self, inertia: float) -> float:
+        """What has to be exceeded, with an inertial force of its own of ``inertia`` [F]."""
+        return max(MATTERS, _SURE * self.noise * abs(inertia) / max(self.spread, 1e-300))
+
+    def _own_inertia(self, xx: Array, xu: Array) -> float:
+        """Rms of the force of the acceleration's part that the other columns don't make [F], with the sign of the mass."""
+        inverse = np.linalg.pinv(xx, rcond=1e-9, hermitian=True)
+        return float((inverse @ xu)[0]) / float(np.sqrt(max(float(inverse[0, 0]), 1e-300) * self.n_samples))
 
     @lru_cache(maxsize=1)  # noqa: B019 - as above
     def growing(self) -> Growth:
@@ -161,7 +195,7 @@ class LagCurves:
             table = energy.reshape(slopes.shape[0], offsets.shape[0])
             row, column = np.unravel_index(int(np.argmin(table)), table.shape)
             k = int(row) * offsets.shape[0] + int(column)
-            inertia = float((np.linalg.pinv(xx, rcond=1e-9, hermitian=True) @ x[:, k])[0])
+            inertia = self._own_inertia(xx, x[:, k])
             return float(offsets[column]), _minimum(slopes, table[:, column]), float(table[row, column]), inertia
 
         offset, slope, energy, inertia = fit(None)
@@ -171,7 +205,9 @@ class LagCurves:
         error = max(error, 0.1 * float(slopes[1] - slopes[0]))
         start = offset - slope * float(np.mean(self.time))
         left = energy / max(float(np.min(curve)), 1e-300)
-        return Growth(slope, error, start, left, inertia / max(float(np.sqrt(max(energy, 0.0) / self.n_samples)), 1e-300))
+        effect, least = self._effect(float(np.min(curve)), energy), self._least_effect(inertia)
+        inertia /= max(float(np.sqrt(max(energy, 0.0) / self.n_samples)), 1e-300)
+        return Growth(slope, error, start, left, inertia, effect, least)
 
 
 def judged(view: View, growing: bool = False) -> tuple[LagCurves | None, str]:
@@ -193,17 +229,21 @@ def judged(view: View, growing: bool = False) -> tuple[LagCurves | None, str]:
 
 
 def _columns(view: View, at: Index) -> Array:
-    """What a motion needs, one column each, scaled to rms 1."""
-    q, v = view.position[at], view.velocity[at]
-    fading = 1.0 / (1.0 + np.abs(v) / max(0.1 * view.speed, 1e-300))
-    middle = float(np.mean(q)) if q.size else 0.0
-    forward, backward = (v > 0.0) * 1.0, (v < 0.0) * 1.0
-    columns = np.column_stack(
-        [view.acceleration[at], q - middle, forward, forward * v, forward * fading, backward, backward * v, backward * fading]
-    )
-    size = np.sqrt(np.mean(columns**2, axis=0)) if at.size else np.ones(columns.shape[1])
+    """What a motion needs, one column each, scaled to rms 1.
+
+    Friction jumps at a reversal and the effort went through the view's filter: so do the columns of friction.
+    """
+    q = view.position[at]
+    middle, half = (float(np.mean(q)), 0.5 * float(np.ptp(q)) or 1.0) if q.size else (0.0, 1.0)
+    q = (q - middle) / half
+    speed = np.abs(view.velocity) / max(view.speed, 1e-300)
+    parts = [np.ones(view.n), speed, speed**2, *(1.0 / (1.0 + speed / low) for low in _FADING)]
+    ways = [view.velocity > 0.0, view.velocity < 0.0]
+    friction = [view.low_pass(way * part)[at] for way in ways if np.any(way) for part in parts]
+    stacked = np.column_stack([view.acceleration[at], q, q**2, q**3, *friction])
+    size = np.sqrt(np.mean(stacked**2, axis=0)) if at.size else np.ones(stacked.shape[1])
     size[size == 0.0] = 1.0
-    return np.asarray(columns / size)
+    return np.asarray(stacked / size)
 
 
 def _minimum(x: Array, y: Array) -> float:

@@ -1,7 +1,7 @@
 """Steps of position and effort: how many of them the motion, and the force, span.
 
 The value is the number of position steps in a typical stroke (the upper quartile), or of effort steps in the effort's usual
-range, whichever is worse off.
+range while it moves, whichever is worse off.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from .view import View
 __all__ = ["CHECK"]
 
 _POSITION = (40.0, 150.0)  # fault below the first, warning below the second
+_FEWEST = 40  # samples in motion
 _EFFORT = (16.0, 40.0)
 
 
@@ -31,7 +32,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     strokes = view.strokes
     stroke = float(np.quantile(strokes, 0.75)) if strokes.size else view.travel
     position = stroke / view.resolution if view.resolution else math.inf
-    low, high = np.quantile(view.record.effort, (0.02, 0.98))
+    # At rest, held, a force hardly changes, and need not.
+    moving = np.interp(view.record.time, np.arange(view.n) * view.h, view.moving) > 0.5
+    low, high = np.quantile(view.record.effort[moving] if np.sum(moving) > _FEWEST else view.record.effort, (0.02, 0.98))
     effort = float(high - low) / view.effort_resolution if view.effort_resolution else math.inf
     levels = np.unique(view.record.effort).size
     if levels <= 5:

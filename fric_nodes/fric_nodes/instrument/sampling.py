@@ -3,7 +3,8 @@
 Every other sample is left out and put back by the cubic through its four neighbours. For a motion of angular frequency w that
 errs by about 0.375 (w h)^3 of a step between samples, so that the error tells how many samples a period of the fastest motion
 has: the value. Noise errs too, but as much when every second sample is missing altogether, where a motion's error grows
-sixteenfold.
+sixteenfold. Where the force jumps, the acceleration does, and the cubic errs there at whatever rate; but only at the few
+samples that have the jump among their neighbours. So error and step are taken as medians over twice as many samples.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from ..record import Array
 from .check import Check, Evidence, Finding, Verdict, each
@@ -21,13 +23,16 @@ __all__ = ["CHECK"]
 _FAULT = 12.0
 _WARNING = 18.0
 _GROWTH = 2.5
+_JUMP = 15  # samples: a jump is among the neighbours of seven
 _WHOLE = 0.05  # of the position's own spread: then it isn't noise
 
 
 def _miss(q: Array) -> tuple[float, float]:
-    """Rms error of the cubic, and of a step between samples."""
+    """Error of the cubic, and step between samples: rms of medians over a few samples."""
     guess = (-q[:-6] + 9.0 * q[2:-4] + 9.0 * q[4:-2] - q[6:]) / 16.0
-    return float(np.sqrt(np.mean((q[3:-3] - guess) ** 2))), float(np.sqrt(np.mean(np.diff(q) ** 2)))
+    local = (median_filter(np.abs(values), size=_JUMP, mode="nearest") for values in (q[3:-3] - guess, np.diff(q)))
+    error, step = (float(np.sqrt(np.mean(values**2))) for values in local)
+    return error, step
 
 
 def _judge(view: View, evidence: Evidence) -> Finding:

@@ -12,6 +12,7 @@ a limit.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,8 @@ _RARE = 0.4  # share of a recording up to which plateaus are a limit and not the
 _WIDENING = 1.4  # between 1 for a clipped signal and 2 for a parabola
 _STEADY = 0.08  # of the recording's high speed: change of speed within a plateau, or beside it
 _FAULT = 0.003
+_HELD = 0.1  # [s] that a force is held for, at least, when somebody wants it so
+_SURE = 4.0  # standard errors
 _OFF = 1.5  # times the imbalance elsewhere
 _OFF_SHARE = 0.015  # of the force range
 
@@ -100,7 +103,12 @@ def _levels(effort: Array, found: list[Plateau], tolerance: float) -> bool:
 
 
 def clipped(view: View, found: list[Plateau]) -> list[Plateau]:
-    """Those of ``found`` at which the force recorded isn't the one that acted, or nobody can tell."""
+    """Those of ``found`` at which the force recorded isn't the one that acted.
+
+    What was recorded has to fall short of what the balance of all other samples asks for there, by more than the balance leaves
+    elsewhere and by more than its own standard error there. Only speeds that occur elsewhere too are judged: inertia is linear
+    in the acceleration, friction need not be so in the speed.
+    """
     if not found:
         return []
     inside = np.zeros(view.n, dtype=np.bool_)
@@ -109,18 +117,25 @@ def clipped(view: View, found: list[Plateau]) -> list[Plateau]:
         first, last = (round(float(view.record.time[k]) / view.h) for k in (plateau.first, plateau.last - 1))
         spans.append(slice(first, last + 1))
         inside[spans[-1]] = True
-    left = imbalance(view, inside)
+    left, error = imbalance(view, inside)
     outside = left[~inside & np.isfinite(left)]
     if outside.size < 40:
-        return found
+        return []
+    speeds = view.velocity[~inside & np.isfinite(left)]
+    slow, fast = float(np.min(speeds)), float(np.max(speeds))
     usual = float(np.sqrt(np.mean(outside**2)))
     limit = max(_OFF * usual, _OFF_SHARE * float(np.ptp(view.force)))
     middle = float(np.median(view.force))
     wrong = []
     for plateau, span in zip(found, spans, strict=True):
-        here = left[span][np.isfinite(left[span])]
+        known = (
+            np.isfinite(left[span]) & np.isfinite(error[span]) & (view.velocity[span] >= slow) & (view.velocity[span] <= fast)
+        )
+        if not np.any(known):
+            continue
         # What acted was more than what was recorded.
-        if here.size and -math.copysign(1.0, plateau.level - middle) * float(np.mean(here)) > limit:
+        short = -math.copysign(1.0, plateau.level - middle) * float(np.mean(left[span][known]))
+        if short > max(limit, _SURE * float(np.mean(error[span][known]))):
             wrong.append(plateau)
     return wrong
 
@@ -136,6 +151,12 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     levels = " and ".join(f"{level:.4g}" for level in sorted({plateau.level for plateau in found}))
     detail = f"the force stays at {levels} {view.record.units.force} {len(found)} time(s), {100 * share:.2g} % of the recording"
     wrong = sum(last - first for first, last, _ in clipped(view, found)) / view.record.n_samples
+    visits = Counter(level for _, _, level in found)
+    longest = max(float(time[b - 1] - time[a]) for a, b, _ in found)
+    if wrong <= _FAULT and max(visits.values()) == 1 and longest > _HELD:
+        # A limit cuts peaks off, again and again; a longer visit to a level is as well a force that was held there.
+        detail += "; once at each level, which a force that was held does too, and the balance does not contradict it"
+        return Finding("saturation", "unknown", detail, share, "1")
     if wrong <= _FAULT:
         detail += "; the force balance holds there: the drive was at its limit, or the force was held"
     remedy = "ask for less acceleration or speed, or raise the limit; parts where the balance breaks are left out of a fit"

@@ -24,6 +24,9 @@ _NARROWING = 1.5
 _ACCELERATION_NOISE = 0.05
 _RARER = 0.05  # share of the sliding samples, at least, in the rarer direction
 _SLIDING = 0.05  # of the recording's high speed
+_CLUSTERS = 20  # of a recording, for standard errors
+_SURE = 4.0  # standard errors
+_STANDS_OUT = 2.0  # times the residual
 _AFTER_REVERSAL = 0.03  # of a typical stroke: pre-sliding, and what a play takes
 
 
@@ -37,6 +40,8 @@ class Balance(NamedTuple):
         residual: rms [F].
         parts: rms of the force of each, shape ``(5,)`` [F].
         n_samples: that it was made from.
+        covariance: of ``values``, shape ``(5, 5)``.
+        own: rms of the force of each that the others don't make, shape ``(5,)`` [F].
     """
 
     names: tuple[str, ...]
@@ -45,6 +50,16 @@ class Balance(NamedTuple):
     residual: float
     parts: Array
     n_samples: int
+    covariance: Array
+    own: Array
+
+    def shows(self, name: str) -> bool:
+        """Whether ``name`` is positive beyond chance, and what only it explains stands out of what nothing explains.
+
+        In a single tone inertia and a spring are one; then a misfit of the friction curve alone makes a mass.
+        """
+        k = self.names.index(name)
+        return bool(self.values[k] > _SURE * self.errors[k] and self.own[k] > _STANDS_OUT * self.residual)
 
     def value(self, name: str) -> float:
         """The value of ``name``."""
@@ -121,11 +136,20 @@ class View:
         while cutoff > lowest:
             smooth = self.low_pass(self.even.position, cutoff)
             acceleration = np.gradient(np.gradient(smooth, self.h), self.h)
-            noise = self.noise * (2.0 * np.pi) ** 2 * cutoff**2.5 * np.sqrt(0.4 * self.h)
+            noise = self._acceleration_noise(cutoff)
             if noise <= _ACCELERATION_NOISE * float(np.sqrt(np.mean(acceleration**2))):
                 break
             cutoff /= _NARROWING
         return max(cutoff, lowest)
+
+    def _acceleration_noise(self, cutoff: float) -> float:
+        """Standard deviation that the position's noise gives the acceleration behind a filter to ``cutoff`` [x/s^2]."""
+        return float(self.noise * (2.0 * np.pi) ** 2 * cutoff**2.5 * np.sqrt(0.4 * self.h))
+
+    @cached_property
+    def acceleration_noise(self) -> float:
+        """Of the filtered acceleration: what noise makes of it, over its rms [1]."""
+        return self._acceleration_noise(self.cutoff) / max(float(np.sqrt(np.mean(self.acceleration**2))), 1e-300)
 
     @cached_property
     def position(self) -> Array:
@@ -218,7 +242,7 @@ def balance_on(view: View, at: Index) -> Balance:
     """Force balance of the samples ``at``."""
     if at.size < 40:
         nothing = np.full(5, np.nan)
-        return Balance(_NAMES, nothing, nothing, float("nan"), nothing, int(at.size))
+        return Balance(_NAMES, nothing, nothing, float("nan"), nothing, int(at.size), np.full((5, 5), np.nan), nothing)
     columns = _columns(view, at)
     size = np.sqrt(np.mean(columns**2, axis=0))
     size[size == 0.0] = 1.0
@@ -227,12 +251,19 @@ def balance_on(view: View, at: Index) -> Balance:
     values = inverse @ (scaled.T @ view.effort[at])
     residual = view.effort[at] - scaled @ values
     # Clusters as long as the slowest thing in the residual can be: a twentieth of the recording.
-    cluster = at * 20 // view.n
-    score = np.zeros((20, 5))
+    cluster = at * _CLUSTERS // view.n
+    score = np.zeros((_CLUSTERS, 5))
     np.add.at(score, cluster, scaled * residual[:, None])
-    errors = np.sqrt(np.maximum(np.diag(inverse @ (score.T @ score) @ inverse), 0.0))
+    n_clusters = np.unique(cluster).size
+    # With fewer clusters than parameters every score can be zero by the fit itself: then no error is known.
+    covariance = np.full((5, 5), np.inf)
+    if n_clusters > 5:
+        covariance = n_clusters / (n_clusters - 5) * (inverse @ (score.T @ score) @ inverse)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     rms = float(np.sqrt(np.mean(residual**2)))
-    return Balance(_NAMES, values / size, errors / size, rms, np.abs(values), int(at.size))
+    own = np.abs(values) / np.sqrt(np.maximum(np.diag(inverse), 1e-300) * at.size)
+    spread = covariance / np.outer(size, size)
+    return Balance(_NAMES, values / size, errors / size, rms, np.abs(values), int(at.size), spread, own)
 
 
 def _columns(view: View, at: Index) -> Array:
@@ -242,21 +273,28 @@ def _columns(view: View, at: Index) -> Array:
     return np.column_stack([view.acceleration[at], np.sign(v), v, np.ones(at.size), q])
 
 
-def imbalance(view: View, without: Mask) -> Array:
-    """Effort that the balance made without some samples leaves unexplained, where it slides; NaN elsewhere, ``(n,)`` [F]."""
+def imbalance(view: View, without: Mask) -> tuple[Array, Array]:
+    """Effort that the balance made without some samples leaves unexplained, where it slides; NaN elsewhere, ``(n,)`` [F].
+
+    And the standard error of what it explains there, ``(n,)`` [F].
+    """
     found = balance_on(view, np.flatnonzero(view.sliding & ~without))
-    left = np.full(view.n, np.nan)
+    left, error = np.full((2, view.n), np.nan)
     at = np.flatnonzero(view.sliding)
     if np.all(np.isfinite(found.values)):
-        left[at] = view.effort[at] - _columns(view, at) @ found.values
-    return left
+        columns = _columns(view, at)
+        left[at] = view.effort[at] - columns @ found.values
+        if np.all(np.isfinite(found.covariance)):
+            error[at] = np.sqrt(np.maximum(np.sum((columns @ found.covariance) * columns, axis=1), 0.0))
+    return left, error
 
 
 def friction_along(view: View) -> tuple[float, float, float]:
     """Friction of the sliding axis along its motion [F], its standard error, and the median sliding speed [x/s].
 
     What the effort does along the motion, without what inertia, a spring and a constant force take: positive when energy is
-    lost. NaN where it isn't known: in one direction alone friction is no different from gravity.
+    lost. Its error holds that of the parts taken off. NaN where it isn't known: in one direction alone friction is no different
+    from gravity.
     """
     found = view.balance
     if not np.all(np.isfinite(found.values)):
@@ -266,12 +304,11 @@ def friction_along(view: View) -> tuple[float, float, float]:
     if not _RARER < float(np.mean(v > 0.0)) < 1.0 - _RARER:
         return float("nan"), float("nan"), float("nan")
     other = found.value("mass") * view.acceleration[at] + found.value("bias") + found.value("stiffness") * q
-    along = np.sign(v) * (view.effort[at] - other)
-    block = at * 20 // view.n
-    count = np.bincount(block, minlength=20)
-    mean = float(np.mean(along))
-    off = np.bincount(block, weights=along - mean, minlength=20)
-    error = float(np.sqrt(np.sum(off[count > 0] ** 2))) / at.size
+    mean = float(np.mean(np.sign(v) * (view.effort[at] - other)))
+    # The same mean by the balance's own terms: its residual is orthogonal to sgn v.
+    slope = np.array([0.0, 1.0, float(np.mean(np.abs(v))), 0.0, 0.0])
+    known = bool(np.all(np.isfinite(found.covariance)))
+    error = float(np.sqrt(max(float(slope @ found.covariance @ slope), 0.0))) if known else float("inf")
     return mean, error, float(np.median(np.abs(v)))
 
 

@@ -70,8 +70,8 @@ def _curve_section(found: StaticMap) -> Section:
     )
     caption = (
         "Mean force of the settled parts at constant velocity, with intervals from the correlation of the force in time and "
-        f"the scatter from run to run ({scatter}). Dashed: the best curve of the other kind, with or without a Stribeck effect."
-        " The two directions are a bias force apart."
+        f"what the curve leaves beyond that ({scatter}). Dashed: the best curve of the other kind, with or without a Stribeck "
+        "effect. The two directions are a bias force apart."
     )
     blocks = [paragraph(stribeck_sentence(choice) + "."), figure(plot, caption)]
     if len(choice.all) > 1:

@@ -11,10 +11,12 @@ from .curve import Choice
 from .load import LoadLaw, MeanForce
 from .presliding import Compliance, Presliding
 from .result import StaticMap
+from .smoothness import structure_of
 
 __all__ = ["messages_of", "status_of", "stribeck_sentence"]
 
 _FEW_SPEEDS = 4
+_FEW_POINTS = 8  # fewer can be exchanged in too few ways
 
 
 def stribeck_sentence(choice: Choice) -> str:
@@ -42,6 +44,7 @@ def messages_of(
     said = []
     if choice is not None:
         said.append(stribeck_sentence(choice))
+        said += _shape_message(means, choice)
         speeds = [abs(mean.velocity) for mean in means]
         if choice.best.candidate.stribeck and choice.best.values[-1] < 1.2 * min(speeds):
             said.append("the Stribeck velocity lies at the slowest speed: the level at rest is extrapolated")
@@ -69,6 +72,21 @@ def messages_of(
             f" one sample to the next ({hardest.source}): they are hardly known; sample faster, or raise the force more slowly"
         )
     return said
+
+
+def _shape_message(means: Sequence[MeanForce], choice: Choice) -> list[str]:
+    """That the points hang on the speed in another way than the curve, and where; they don't scatter then."""
+    if len(means) < _FEW_POINTS or choice.best.scatter == 0.0:
+        return []
+    velocity = np.array([mean.velocity for mean in means])
+    left = np.array([mean.friction for mean in means]) - choice.best.force(velocity)
+    found = structure_of(velocity, left, np.array([mean.force[1] for mean in means]))
+    if not found.why:
+        return []
+    return [
+        f"{found.why}, which scatter is not in 99 of 100 cases: friction has a shape over the speed that no curve here has, "
+        f"most of it from {found.low:.3g} to {found.high:.3g}; use the points there, and record more speeds"
+    ]
 
 
 def _load_messages(means: Sequence[MeanForce], loads: LoadLaw | None, load_name: str) -> list[str]:

@@ -3,7 +3,9 @@
 Each fault says which check must find it, and with which verdicts it counts as found: a limit that may be meant so (a constant
 force, a filtered velocity, a vibration) is a warning by design. What acts on the axis itself (a limit, an end stop) is
 simulated; the rest is done to the recording. Only motions are drawn that can show the fault: a delay does not show in a slow
-triangle, and no check claims it would.
+triangle, and no check claims it would. Whether one can is told by the truth, not by the check: a shift of the effort has to
+change the inertial force by a tenth of the effort, a limit has to be reached more than once, and where friction is hidden
+inertia has to be left. Where it can't, another recording is drawn.
 """
 
 from __future__ import annotations
@@ -18,12 +20,17 @@ from scipy.ndimage import gaussian_filter1d
 
 from ...model import Model
 from ...record import Array, Record
+from ..view import runs
 from .axes import ACTIVE, AXES, Rig, draw_rig, record_of, run_rig, scaled_nominal
 
 __all__ = ["FAULTS", "Fault", "Trial"]
 
 _FOLLOWED = ("multisine", "chirp", "point_to_point")
 _BUSY = (*ACTIVE, "reversals", "steps", "ramps")
+_APART = 1_000_000  # from the seed of a recording to that of the next one drawn; the kinds of axes take turns alike
+_TRIES = 40
+_SHOWS = 0.1  # of the effort's standard deviation
+_REACHED = 0.02  # [s] at the limit that counts as a visit
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,13 +120,15 @@ def _clipped(record: Record, random: np.random.Generator) -> Record:
     return replace(record, effort=np.clip(record.effort, -limit, limit))
 
 
-def _limited(seed: int) -> Trial:
+def _limited(seed: int) -> Trial | None:
     def change(rig: Rig, random: np.random.Generator) -> Rig:
         most = float(np.max(np.abs(run_rig(rig).force)))
         limit = max(float(random.uniform(0.6, 0.75)) * most, 1.3 * rig.nominal.value("coulomb.force"))
         return replace(rig, force_limit=limit)
 
-    return Trial((_base(seed, ("multisine", "point_to_point"), change)[0],))
+    record, rig, raw, _ = _base(seed, ("multisine", "point_to_point"), change)
+    visits = [b - a for a, b in runs(np.abs(raw.force) >= rig.force_limit) if (b - a) * rig.sample_time >= _REACHED]
+    return Trial((record,)) if len(visits) > 2 else None
 
 
 def _walled(seed: int) -> Trial:
@@ -147,18 +156,44 @@ def _folded(record: Record, random: np.random.Generator) -> Record:
     return replace(record, effort=record.effort + size * np.sin(2.0 * np.pi * frequency * record.time + 1.0))
 
 
+def _first(make: Callable[[int], Trial | None]) -> Callable[[int], Trial]:
+    """The trial of the first seed, from the one asked for, whose recording can show the fault."""
+
+    def found(seed: int) -> Trial:
+        trials = (make(seed + _APART * attempt) for attempt in range(_TRIES))
+        return next(trial for trial in trials if trial is not None)
+
+    return found
+
+
+def _late(motions: tuple[str, ...], shift: Callable[[Record, np.random.Generator], Array | float]) -> Callable[[int], Trial]:
+    """A fault that shifts the effort in time."""
+
+    def make(seed: int) -> Trial | None:
+        record, rig, raw, random = _base(seed, motions)
+        time = rig.sample_time * np.arange(raw.velocity.size)
+        force = rig.nominal.value("mass") * np.gradient(gaussian_filter1d(raw.velocity, 2.0), rig.sample_time)
+        late = shift(record, random)
+        changed = force - np.interp(time - late, time, force)
+        if float(np.std(changed)) < _SHOWS * float(np.std(raw.force)):
+            return None
+        return Trial((_shifted(record, late),))
+
+    return _first(make)
+
+
 def _shifted(record: Record, shift: Array | float) -> Record:
     moved = replace(record, effort=np.interp(record.time - shift, record.time, record.effort))
     return moved.between(0.05, record.duration - 0.05)  # where the effort is known
 
 
-def _delayed(record: Record, random: np.random.Generator) -> Record:
-    return _shifted(record, _sign(random) * float(random.uniform(0.008, 0.02)))
+def _delayed(record: Record, random: np.random.Generator) -> float:
+    return _sign(random) * float(random.uniform(0.008, 0.02))
 
 
-def _drifting(record: Record, random: np.random.Generator) -> Record:
+def _drifting(record: Record, random: np.random.Generator) -> Array:
     total = _sign(random) * float(random.uniform(0.015, 0.03))
-    return _shifted(record, total * (record.time / record.duration - 0.5))
+    return np.asarray(total * (record.time / record.duration - 0.5))
 
 
 def _holes(record: Record, random: np.random.Generator) -> Record:
@@ -231,7 +266,7 @@ def _offset(seed: int) -> Trial:
     return Trial((replace(record, effort=record.effort + rig.scale[1] * size),))
 
 
-def _helped(seed: int) -> Trial:
+def _helped(seed: int) -> Trial | None:
     """The drive adds most of the friction by itself, and only the controller's part is recorded.
 
     It goes by the velocity that it measures or, where the axis follows closely, by the one that is wanted.
@@ -240,6 +275,9 @@ def _helped(seed: int) -> Trial:
     record, rig, raw, random = _base(seed, ("multisine", "point_to_point") if by_reference else _BUSY)
     share = float(random.uniform(0.8, 1.0))
     coulomb, viscous = rig.nominal.value("coulomb.force"), rig.nominal.value("viscous.coefficient")
+    inertial = rig.nominal.value("mass") * np.gradient(gaussian_filter1d(raw.velocity, 2.0), rig.sample_time)
+    if float(np.std(inertial)) < coulomb * _SHOWS:
+        return None
     wanted = rig.wanted.velocity if by_reference else raw.velocity
     added = share * (coulomb * np.tanh(wanted / 1e-3) + viscous * wanted)
     seen = raw.force - added + rig.force_noise * random.standard_normal(raw.force.size)
@@ -251,20 +289,20 @@ def _fault(name: str, check: str, make: Callable[[int], Trial], *verdicts: str) 
 
 
 FAULTS: tuple[Fault, ...] = (
-    _fault("too short", "length", _done(("multisine", "point_to_point"), _short)),
-    _fault("at rest", "excitation", _still),
-    _fault("one speed", "excitation", _one_speed, "warning", "fault"),
-    _fault("one direction", "direction", _done(("multisine", "ramps", "reversals"), _one_way)),
+    _fault("too short", "length", _done(("multisine", "point_to_point"), _short), "warning"),
+    _fault("at rest", "excitation", _still, "warning"),
+    _fault("one speed", "excitation", _one_speed, "warning"),
+    _fault("one direction", "direction", _done(("multisine", "ramps", "reversals"), _one_way), "warning"),
     _fault("force signal clipped", "saturation", _done(("multisine", "point_to_point", "force"), _clipped)),
-    _fault("drive at its limit", "saturation", _limited, "warning", "fault"),
+    _fault("drive at its limit", "saturation", _first(_limited), "warning", "fault"),
     _fault("end stop", "end_stop", _walled),
     _fault("sampled too slowly", "sampling", _thinned),
     _fault("folded line", "aliasing", _done(_BUSY, _folded), "warning", "fault"),
-    _fault("clock drift", "clock_drift", _done(("multisine", "point_to_point", "force"), _drifting)),
-    _fault("delay", "delay", _done(ACTIVE, _delayed)),
+    _fault("clock drift", "clock_drift", _late(("multisine", "point_to_point", "force"), _drifting)),
+    _fault("delay", "delay", _late(ACTIVE, _delayed)),
     _fault("dropped samples", "stamps", _done(_BUSY, _holes)),
     _fault("repeated samples", "stamps", _done(ACTIVE, _repeats)),
-    _fault("jitter", "stamps", _done(_BUSY, _jittering)),
+    _fault("jitter", "stamps", _done(_BUSY, _jittering), "warning", "fault"),
     _fault("coarse position", "resolution", _done(_BUSY, _coarse_position)),
     _fault("coarse effort", "resolution", _done(_BUSY, _coarse_effort)),
     _fault("effort of wrong sign", "effort_sign", _done(_BUSY, lambda r, _: replace(r, effort=-r.effort))),
@@ -276,7 +314,7 @@ FAULTS: tuple[Fault, ...] = (
            _done(_BUSY, lambda r, g: replace(r, velocity=_factor(g) * _velocity(r, g)))),
     _fault("velocity of wrong sign", "velocity_signal", _done(_BUSY, lambda r, g: replace(r, velocity=-_velocity(r, g)))),
     _fault("late velocity", "velocity_signal", _done(ACTIVE, _late_velocity), "warning", "fault"),
-    _fault("drive compensates friction", "compensated_drive", _helped),
+    _fault("drive compensates friction", "compensated_drive", _first(_helped)),
     _fault("frozen effort", "frozen", _done(_BUSY, lambda r, g: _stuck(r, g, "effort"))),
     _fault("frozen position", "frozen", _done(ACTIVE, lambda r, g: _stuck(r, g, "position"))),
     _fault("effort missing", "frozen", _done(_BUSY, lambda r, _: replace(r, effort=np.zeros(r.n_samples)))),

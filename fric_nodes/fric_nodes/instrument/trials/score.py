@@ -10,8 +10,12 @@ from .. import inspect
 from ..check import Finding
 from .axes import AXES, CLEAN_ONLY, MOTIONS, draw_rig, record_of, run_rig, scaled_nominal
 from .faults import FAULTS, Fault, Trial
+from .ordinary import ordinary
 
-__all__ = ["Hits", "clean_trial", "false_alarms", "hits"]
+__all__ = ["LIMITS", "Alarms", "Hits", "clean_trial", "false_alarms", "hits", "ordinary_alarms"]
+
+LIMITS = frozenset({"direction", "excitation", "length", "resolution", "sampling", "sensor_side"})
+"""Checks whose warnings say what a recording can't show; no fault of it."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,28 @@ class Hits:
     named_first: int
     trials: int
     missed: tuple[tuple[int, str], ...]
+
+
+@dataclass(frozen=True)
+class Alarms:
+    """What checks said of clean recordings.
+
+    Attributes:
+        faults: found, with the seed of the recording; each is a false one.
+        warnings: number of recordings with a warning of each check that says that something is wrong; each is a false one.
+        limits: the same of the checks that say what a recording can't show, rightly.
+        trials: number of recordings.
+    """
+
+    faults: tuple[tuple[int, str], ...]
+    warnings: Counter[str]
+    limits: Counter[str]
+    trials: int
+
+    @property
+    def wrong(self) -> int:
+        """Number of recordings with a fault."""
+        return len({seed for seed, _ in self.faults})
 
 
 def hits(fault: Fault, seeds: Iterable[int]) -> Hits:
@@ -71,6 +97,23 @@ def false_alarms(seeds: Sequence[int]) -> tuple[list[tuple[int, Finding]], Count
                 wrong.append((seed, finding))
             warnings[finding.check] += finding.verdict == "warning"
     return wrong, warnings
+
+
+def ordinary_alarms(seeds: Sequence[int]) -> Alarms:
+    """What checks say of ordinary recordings; with the model for every other seed."""
+    faults: list[tuple[int, str]] = []
+    warnings: Counter[str] = Counter()
+    limits: Counter[str] = Counter()
+    for seed in seeds:
+        test = ordinary(seed)
+        for finding in inspect([test.record], test.model if seed % 2 else None):
+            # A constant force beside friction is true of an axis with a weight.
+            true = finding.check in LIMITS or (finding.check == "offset" and test.gravity != 0.0)
+            if finding.verdict == "fault":
+                faults.append((seed, f"{test.record.source}: {finding.check}: {finding.detail}"))
+            elif finding.verdict == "warning":
+                (limits if true else warnings)[finding.check] += 1
+    return Alarms(tuple(faults), warnings, limits, len(seeds))
 
 
 def every_fault(seeds: Sequence[int]) -> list[Hits]:
