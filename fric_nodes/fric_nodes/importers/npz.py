@@ -21,7 +21,7 @@ def read(path: Path, options: TextOptions, wanted: Sequence[Source]) -> Table:
     """
     table = Table(path)
     try:
-        with np.load(path, allow_pickle=False) as content:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
             for name in content.files:
                 try:
                     table.add(name, content[name])
