@@ -176,6 +176,9 @@ class _Import:
                 self.notes.append(f"time is given by the clock: taken in seconds, not in {one_line(entry.unit)}")
             self.midnight = table.clocks[column] if self.midnight is None else self.midnight
             return values + (table.clocks[column] - self.midnight)
+        if column in table.clocks:
+            what = f"signal '{name}' is to come from '{one_line(entry.source)}', which holds clock times"
+            raise ImportingError(table.path, what, "map a column of numbers")
         with np.errstate(all="ignore"):  # what is not finite is found later, and said
             return self._to_si(name, values * _factor(table, name, entry.scale) + entry.offset, entry.unit)
 

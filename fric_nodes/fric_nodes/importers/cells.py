@@ -11,12 +11,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from datetime import datetime, timezone
+from functools import lru_cache
 
 import numpy as np
 
 from ..record import Array
 
-__all__ = ["DAY", "MISSING", "comma_is", "first_bad", "is_clock", "number", "numbers", "past_midnight"]
+__all__ = ["DAY", "MISSING", "are_clocks", "clock", "comma_is", "first_bad", "is_clock", "number", "numbers", "past_midnight"]
 
 MISSING = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none", "nil", "-", "--", "?", "1.#qnan", "-1.#ind", "nan(ind)", "-nan"})
 _INFINITE = {"inf": np.inf, "+inf": np.inf, "-inf": -np.inf, "infinity": np.inf, "-infinity": -np.inf, "1.#inf": np.inf}
@@ -34,6 +35,7 @@ DAY = 86_400.0  # [s]
 _QUOTES = "\"' \t\u00a0"
 
 
+@lru_cache(maxsize=1 << 14)  # while it is found out how a file is written, its cells are looked at several times
 def number(cell: str, decimal: str = ".") -> float | None:
     """The number a cell stands for, NaN when it is a way to write that there is none, None when it is neither.
 
@@ -55,12 +57,24 @@ def number(cell: str, decimal: str = ".") -> float | None:
     if _GROUPED[decimal].match(text):
         digits = re.sub(r"[,'’\u00a0\u2009\u202f ]" if decimal == "." else r"[.'’\u00a0\u2009\u202f ]", "", text)
         return float(digits.replace(",", "."))
-    return _clock(text)
+    return None
+
+
+def clock(cell: str) -> float | None:
+    """Seconds since midnight or since 1970 of a clock time, NaN where there is none, None for anything else."""
+    text = cell.strip(_QUOTES)
+    return float("nan") if text.lower() in MISSING else _clock(text) if ":" in text else None
+
+
+def are_clocks(cells: Sequence[str]) -> bool:
+    """True when most of the cells that hold something are clock times."""
+    filled = [cell for cell in cells if cell.strip(_QUOTES).lower() not in MISSING]
+    return 2 * sum(map(is_clock, filled)) > len(filled)
 
 
 def is_clock(cell: str) -> bool:
     """True for a clock time or a date with one."""
-    return _CLOCK.match(cell.strip(_QUOTES)) is not None
+    return ":" in cell and _CLOCK.match(cell.strip(_QUOTES)) is not None
 
 
 def _clock(text: str) -> float | None:
@@ -83,14 +97,14 @@ def _clock(text: str) -> float | None:
     return None
 
 
-def numbers(cells: Sequence[str], decimal: str = ".") -> Array | None:
-    """The numbers of a column, NaN where there is none; None when a cell is neither."""
-    quick = _quick(cells, decimal)
+def numbers(cells: Sequence[str], decimal: str = ".", clocks: bool = False) -> Array | None:
+    """The numbers of a column, or its clock times, NaN where there is none; None when a cell is neither."""
+    quick = None if clocks else _quick(cells, decimal)
     if quick is not None:
         return quick
     found = np.empty(len(cells))
     for index, cell in enumerate(cells):
-        value = number(cell, decimal)
+        value = clock(cell) if clocks else number(cell, decimal)
         if value is None:
             return None
         found[index] = value
@@ -114,9 +128,9 @@ def past_midnight(seconds: Array) -> Array:
     return seconds + DAY * np.cumsum(np.nan_to_num(step) < -0.5 * DAY)
 
 
-def first_bad(cells: Sequence[str], decimal: str = ".") -> int:
-    """Index of the first cell that is neither a number nor a way to write that there is none."""
-    return next((index for index, cell in enumerate(cells) if number(cell, decimal) is None), 0)
+def first_bad(cells: Sequence[str], clocks: bool = False) -> int:
+    """Index of the first cell that is neither a number, or a clock time, nor a way to write that there is none."""
+    return next((index for index, cell in enumerate(cells) if (clock(cell) if clocks else number(cell)) is None), 0)
 
 
 def comma_is(cells: Iterable[str]) -> str:

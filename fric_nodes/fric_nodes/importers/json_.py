@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .cells import is_clock, number
+from .cells import are_clocks, clock, number
 from .errors import ImportingError, one_line
 from .lines import Line, encoding_of, lines_of
 from .table import Importer, Source, Table, TextOptions
@@ -149,19 +149,22 @@ def _float(value: Any) -> float:
 
 
 def _column(table: Table, name: str, values: list[Any], places: Sequence[int], place: str) -> None:
+    clocks = are_clocks([value if isinstance(value, str) else "0" for value in values[:50] if value is not None])
     found = np.full(len(values), np.nan)
     for index, value in enumerate(values):
         if value is None:
             continue
-        parsed = number(value) if isinstance(value, str) else None if isinstance(value, (bool, dict, list)) else _float(value)
+        if isinstance(value, str):
+            parsed = clock(value) if clocks else number(value)
+        else:
+            parsed = None if clocks or isinstance(value, (bool, dict, list)) else _float(value)
         if parsed is None:
             what = f"{place} {places[index]}: '{one_line(value)}' is not a number"
             table.unusable[name] = (what, "map a column of numbers, or correct the file")
             return
         found[index] = parsed
-    clock = any(isinstance(value, str) and is_clock(value) for value in values[:50])
     table.columns[name] = found
-    if clock:
+    if clocks:
         table.as_clock(name)
 
 

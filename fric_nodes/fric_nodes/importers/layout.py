@@ -7,12 +7,13 @@ decimal sign then follows from all cells of these columns together, see :func:`~
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .cells import MISSING, comma_is, number
+from .cells import MISSING, clock, comma_is, is_clock, number
 from .errors import ImportingError, one_line
 from .lines import Line, encoding_of, is_comment, sample_lines, split, uncommented
 from .table import Source, TextOptions
@@ -22,7 +23,7 @@ __all__ = ["Layout", "find_layout"]
 
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: any run of blanks
 _HEAD = 50  # rows that are kept
-_SAMPLE = 200  # lines that are looked at in each part of the file
+_SAMPLE = 100  # lines that are looked at in each part of the file
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def find_layout(path: Path, options: TextOptions, wanted: Sequence[Source]) -> L
 
 
 def _any_number(cell: str) -> bool:
-    return cell.lower() not in MISSING and (number(cell) is not None or number(cell, ",") is not None)
+    return cell.lower() not in MISSING and (number(cell) is not None or number(cell, ",") is not None or is_clock(cell))
 
 
 def _candidate(
@@ -124,10 +125,10 @@ def _candidate(
     numbers = [_index(source, names, aliases) for source in wanted]
     resolved = all(column is not None for column in numbers)
     columns = sorted({column for column in numbers if column is not None})
-    data = [*(split(line.text, delimiter) for line in first[index:][:_SAMPLE] if not is_comment(line.text, delimiter)), *body]
-    cells = [[row[k] for row in data if k < len(row)] for k in columns]
+    data = [split(line.text, delimiter) for line in first[index:][:_SAMPLE] if not is_comment(line.text, delimiter)]
+    cells = [[row[k] for row in (*data, *body) if k < len(row)] for k in columns]
     decimal, ambiguous = (options.decimal, None) if options.decimal else _decimal(cells, columns, mask)
-    good = sum(_fits(row, columns, decimal) for row in [*data, *rows]) / (len(data) + len(rows))
+    good = sum(_fits(row, columns, decimal) for row in rows) / len(rows)
     # Without names that fit, what the mapping asks for can't be judged: the columns that hold numbers are.
     general = sum(len(row) == width and _fits(row, mask, decimal) for row in rows) / len(rows) * len(mask)
     start = first[index].at - 1
@@ -136,23 +137,32 @@ def _candidate(
 
 
 def _start(first: list[Line], delimiter: str | None, width: int, mask: Sequence[int]) -> int:
-    """First of two lines in a row that hold numbers where most lines do; comments and blank lines don't count."""
-    before = None
-    for index, line in enumerate(first):
-        if is_comment(line.text, delimiter):
-            continue
-        row = split(line.text, delimiter)
-        fits = len(row) >= min(width, mask[-1] + 1) and any(_any_number(row[k]) for k in mask if k < len(row))
-        fits = fits and all(_any_number(row[k]) or row[k].lower() in MISSING for k in mask if k < len(row))
-        if fits and before is not None:
-            return before
-        before = index if fits else None
-    return before if before is not None else 0
+    """First of two lines in a row that hold numbers where most lines do, with damaged ones right before it.
+
+    Comments and blank lines don't count. A line above of which more than half of these cells are numbers is no header.
+    """
+    lines = [(index, split(line.text, delimiter)) for index, line in enumerate(first) if not is_comment(line.text, delimiter)]
+    good = [_shares(row, width, mask) for _, row in lines]
+    start = next((at for at in range(len(lines) - 1) if good[at] == good[at + 1] == 1.0), None)
+    start = start if start is not None else next((at for at in range(len(lines)) if good[at] == 1.0), 0)
+    while start > 0 and good[start - 1] > 0.5:
+        start -= 1
+    return lines[start][0] if lines else 0
+
+
+def _shares(row: Sequence[str], width: int, mask: Sequence[int]) -> float:
+    """Share of the cells where numbers are expected that hold one; those that are empty count as such when not all are."""
+    if len(row) < min(width, mask[-1] + 1):
+        return 0.0
+    cells = [row[k] for k in mask]
+    numbers = sum(map(_any_number, cells))
+    return (numbers + sum(cell.lower() in MISSING for cell in cells)) / len(cells) if numbers else 0.0
 
 
 def _fits(row: Sequence[str], columns: Sequence[int], decimal: str) -> bool:
-    found = [number(row[k], decimal) for k in columns if k < len(row)]
-    return bool(found) and all(value is not None for value in found) and any(value == value for value in found)
+    cells = [row[k] for k in columns if k < len(row)]
+    found = [clock(cell) if is_clock(cell) else number(cell, decimal) for cell in cells]
+    return bool(found) and all(value is not None for value in found) and any(value is not None and not math.isnan(value) for value in found)
 
 
 def _decimal(cells: list[list[str]], columns: Sequence[int], mask: Sequence[int]) -> tuple[str, str | None]:

@@ -97,9 +97,9 @@ def sample_lines(path: Path, encoding: str, skip: int, count: int) -> tuple[list
             break
     size = path.stat().st_size
     if size <= 2 * _BLOCK:
-        whole = [line.text.rstrip("\r\n") for line in lines_of(path, encoding, "", skip) if line.text.strip()]
-        step = max(1, len(whole) // (2 * count))
-        return first, [*whole[len(whole) // 2 :][:count], *whole[::step]]
+        whole = [line.text for line in first] if len(first) < 10 * count else []
+        whole = whole or [line.text.rstrip("\r\n") for line in lines_of(path, encoding, "", skip) if line.text.strip()]
+        return first, whole if len(whole) <= 2 * count else [*whole[len(whole) // 2 :][:count], *whole[:: len(whole) // count]]
     later: list[str] = []
     wide = 4 if "32" in encoding else 2 if "16" in encoding else 1
     plain = encoding.replace("-sig", "") if wide == 1 else encoding

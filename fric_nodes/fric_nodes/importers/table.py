@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..record import Array
-from .cells import DAY, first_bad, is_clock, numbers, past_midnight
+from .cells import DAY, are_clocks, first_bad, numbers, past_midnight
 from .errors import ImportingError, one_line
 
 __all__ = ["Importer", "Source", "Table", "TextOptions", "closest"]
@@ -103,14 +103,15 @@ class Table:
 
     def add_cells(self, name: str, cells: Sequence[str], lines: Sequence[int] | None = None) -> None:
         """Take texts as a column when they are numbers or clock times, and as unusable when they aren't."""
-        found = numbers(cells)
+        clocks = are_clocks(cells[:50])
+        found = numbers(cells, clocks=clocks)
         if found is None:
-            at = first_bad(cells)
+            at = first_bad(cells, clocks)
             place = f"line {lines[at]}" if lines is not None else f"row {at}"
             self.unusable[name] = (f"{place}: '{one_line(cells[at])}' is not a number", "map a column of numbers, or correct the file")
             return
         self.columns[name] = found
-        if any(map(is_clock, cells[:50])):
+        if clocks:
             self.as_clock(name)
 
     def as_clock(self, name: str) -> None:

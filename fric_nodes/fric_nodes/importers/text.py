@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from ..record import Array
-from .cells import MISSING, is_clock, number, numbers
+from .cells import MISSING, are_clocks, clock, is_clock, number, numbers
 from .errors import ImportingError, one_line
 from .layout import Layout, find_layout
 from .lines import Line, is_comment, last_lines, lines_of, split
@@ -34,6 +34,7 @@ from .table import Importer, Source, Table, TextOptions
 __all__ = ["IMPORTER"]
 
 _CHUNK = 100_000  # lines that are looked at together
+_SMALL = 1 << 16  # [bytes] below, to start pyarrow's reader takes longer than to read
 _BLOCK = 1 << 24  # [bytes] that pyarrow takes at a time
 _TELLING = 10  # lines of equal decimals that show how a number is written
 
@@ -49,14 +50,15 @@ def read(path: Path, options: TextOptions, wanted: Sequence[Source]) -> Table:
     chosen = list(layout.wanted) if wanted else list(range(layout.width))
     if wanted and not chosen:
         return _only_names(table, layout)
-    columns = _in_one_go(path, layout, chosen)
+    clocks = {index for index in chosen if are_clocks([row[index] for row in layout.head if index < len(row)])}
+    columns = _in_one_go(path, layout, chosen) if path.stat().st_size > _SMALL else None
     if columns is None:
-        columns = _line_by_line(path, layout, chosen, table, options.repair, bool(wanted))
+        columns = _line_by_line(path, layout, chosen, clocks, table, options.repair, bool(wanted))
     _last_line(path, layout, chosen, columns, table)
     for index, values in zip(chosen, columns, strict=True):
         name = layout.names[index]
         table.columns[name] = values
-        if any(is_clock(row[index]) for row in layout.head if index < len(row)):
+        if index in clocks:
             table.as_clock(name)
     return table
 
@@ -103,7 +105,9 @@ def _in_one_go(path: Path, layout: Layout, chosen: list[int]) -> list[Array] | N
     if not batches:
         return None
     content = pa.Table.from_batches(batches)
-    return [column.to_numpy().astype(np.float64) for column in content.columns]
+    columns = [column.to_numpy().astype(np.float64) for column in content.columns]
+    # Whether a line without any of these values is a sample is seen from its other cells.
+    return None if np.isnan(np.stack(columns)).all(axis=0).any() else columns
 
 
 def _single_blanks(path: Path, start: int) -> bytes:
@@ -146,11 +150,13 @@ class _Reader:
     Args:
         layout: how it is written.
         chosen: numbers of the columns.
+        clocks: those of them that are clock times.
         judged: False to take a cell that is no number as missing in silence, when no column was asked for.
     """
 
-    def __init__(self, layout: Layout, chosen: list[int], judged: bool) -> None:
+    def __init__(self, layout: Layout, chosen: list[int], clocks: set[int], judged: bool) -> None:
         self.layout, self.chosen, self.judged = layout, chosen, judged
+        self.clocks = [index in clocks for index in chosen]
         self.messages, self.cells, self.cut, self.pending = _Trouble(), _Trouble(), _Trouble(), _Trouble()
         self.bad_column = ""
         self.bad = [0] * len(chosen)
@@ -209,19 +215,22 @@ class _Reader:
         rows.lines.append(line.at)
         rows.text.append(line.text)
 
-    def _message(self, line: Line, cells: Sequence[str], dry: bool = False) -> bool:
-        """Count a line of which at most half of the cells asked for are numbers as one between the data."""
-        found = [number(cell, self.layout.decimal) for cell in cells]
-        good = sum(value is not None and value == value for value in found)
+    def _message(self, line: Line, cells: Sequence[str], whole: bool = False, dry: bool = False) -> bool:
+        """Count a line of which fewer than half of the cells asked for are numbers as one between the data.
+
+        Of a line with as many cells as the others (``whole``) half are enough to make it a sample that is damaged.
+        """
+        found = [number(cell, self.layout.decimal) if not is_clock(cell) else clock(cell) for cell in cells]
+        good = sum(value is not None and not math.isnan(value) for value in found)
         words = sum(value is None for value in found)
-        message = good <= words
+        message = good < words or (good == words and not (whole and good))
         if message and not dry:
             self.pending.add(line.at, line.text)
         return message
 
     def _converted(self, rows: _Rows, kept: Any) -> list[Array]:
         decimal = self.layout.decimal
-        columns = [numbers(cells, decimal) for cells in rows.cells]
+        columns = [numbers(cells, decimal, timed) for cells, timed in zip(rows.cells, self.clocks, strict=True)]
         if all(column is not None for column in columns):
             self._settle(bool(rows.lines))
             return [column for column in columns if column is not None]
@@ -229,12 +238,12 @@ class _Reader:
         found = [np.empty(count) for _ in self.chosen]
         for k in range(count):
             cells = [column[k] for column in rows.cells]
-            values = [number(cell, decimal) for cell in cells]
+            values = [clock(cell) if timed else number(cell, decimal) for cell, timed in zip(cells, self.clocks, strict=True)]
             wrong = [index for index, value in enumerate(values) if value is None]
-            if wrong and self.judged and self._message(Line(rows.lines[k], rows.text[k]), cells):
+            if wrong and self.judged and self._message(Line(rows.lines[k], rows.text[k]), cells, whole=True):
                 kept[k] = False
                 continue
-            if any(value is not None and value == value for value in values):
+            if any(value is not None and not math.isnan(value) for value in values):
                 self._settle(True)
             for index in wrong:
                 self._wrong(index, rows.lines[k], cells[index])
@@ -258,9 +267,9 @@ class _Reader:
 
 
 def _line_by_line(
-    path: Path, layout: Layout, chosen: list[int], table: Table, repair: bool, judged: bool
+    path: Path, layout: Layout, chosen: list[int], clocks: set[int], table: Table, repair: bool, judged: bool
 ) -> list[Array]:
-    reader = _Reader(layout, chosen, judged)
+    reader = _Reader(layout, chosen, clocks, judged)
     lines = lines_of(path, layout.encoding, layout.delimiter, layout.start)
     parts: list[list[Array]] = []
     while (part := reader.chunk(lines)) is not None:
