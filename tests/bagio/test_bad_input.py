@@ -303,7 +303,7 @@ def test_slow_recordings_have_longer_gaps(write_bag: Any, joint_rows: Any) -> No
 
 def test_nothing_left_after_repair(write_bag: Any, joint_rows: Any) -> None:
     bag = write_bag(joint_rows(position=lambda k: float("nan") if k > 4 else 0.0))
-    with pytest.raises(BagError, match="95 of 100 samples.*too many to repair"):
+    with pytest.raises(BagError, match=r"95 of 100 samples.*too many to repair"):
         read_record(bag, repair=True)
 
 

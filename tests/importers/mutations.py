@@ -28,13 +28,56 @@ STRUCT_MAP: dict[str, Any] = {
 }
 # What stands in cells and lines of real files.
 CELLS = (
-    "", "nan", "NaN", "inf", "-inf", "1e400", "-1e400", "1e-400", "NA", "null", "-", "abc", "True", "0x1F", "1,234", "1.234.567",
-    "1'234.5", "1D3", "12:30:01.5", "2024-05-01T12:00:00Z", '"', '""', "1_000", "\u0661", "\u2212" + "1", "9" * 400, " ", "\0", "#", "1e", "--5",
-)  # fmt: skip
+    "",
+    "nan",
+    "NaN",
+    "inf",
+    "-inf",
+    "1e400",
+    "-1e400",
+    "1e-400",
+    "NA",
+    "null",
+    "-",
+    "abc",
+    "True",
+    "0x1F",
+    "1,234",
+    "1.234.567",
+    "1'234.5",
+    "1D3",
+    "12:30:01.5",
+    "2024-05-01T12:00:00Z",
+    '"',
+    '""',
+    "1_000",
+    "\u0661",
+    "\u2212" + "1",
+    "9" * 400,
+    " ",
+    "\0",
+    "#",
+    "1e",
+    "--5",
+)
 LINES = (
-    "", "# a comment", "MOT: Warn: current limit", "t,q,u", "s,m,N", ",,", "EOF", '"open', "1,2", "1,2,3,4", "0.1,0.2,0.3,", "\0\0\0\0", "%", ";",
-    "Warn: 12, 13, x", "\ufeff",
-)  # fmt: skip
+    "",
+    "# a comment",
+    "MOT: Warn: current limit",
+    "t,q,u",
+    "s,m,N",
+    ",,",
+    "EOF",
+    '"open',
+    "1,2",
+    "1,2,3,4",
+    "0.1,0.2,0.3,",
+    "\0\0\0\0",
+    "%",
+    ";",
+    "Warn: 12, 13, x",
+    "\ufeff",
+)
 
 
 def table(separator: str = ",", decimal: str = ".", head: str = "t,q,u", quoted: bool = False) -> bytes:

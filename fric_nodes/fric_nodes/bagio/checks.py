@@ -1,13 +1,13 @@
 """What makes a recording unusable, checked before anything else is done with it.
 
 Each finding is one line with file, cause and remedy. With ``repair`` missing values are filled where the motion says what they
-were, and samples are marked or dropped where it doesn't; each thing done is said in the notes: what, how many, where, why. Nothing
-happens in silence, and a recording of which more than half would be lost is refused.
+were, and samples are marked or dropped where it doesn't; each thing done is said in the notes: what, how many, where, why.
+Nothing happens in silence, and a recording of which more than half would be lost is refused.
 
-Missing values: a signal that has one in every n-th row only was sampled at a rate of its own and is brought onto the others', see
-:mod:`.clocks`. In any other, up to three in a row are bridged: by the cubic through the samples around for a motion, by the line for
-a force. A fit uses frequencies up to about a tenth of the rate, and over four steps such a motion is a cubic to within a per mille.
-Longer stretches are marked as not to be used; those at the ends are left out.
+Missing values: a signal that has one in every n-th row only was sampled at a rate of its own and is brought onto the others',
+see :mod:`.clocks`. In any other, up to three in a row are bridged: by the cubic through the samples around for a motion, by
+the line for a force. A fit uses frequencies up to about a tenth of the rate, and over four steps such a motion is a cubic to
+within a per mille. Longer stretches are marked as not to be used; those at the ends are left out.
 
 Terms: a *gap* is a step longer than ten median steps and than 50 ms; a shorter irregularity is jitter and is left alone. A
 *jump* is a step of more than 10 s forward, or a clock that starts again at an earlier time and goes on from there.
@@ -180,10 +180,15 @@ def _finite(where: object, samples: Samples, repair: bool) -> None:
         if finite.all():
             continue
         bad = np.flatnonzero(~finite)
-        what = f"{name} is not finite (NaN or inf) at {bad.size} of {signal.size} samples, first at {samples.seconds(bad[0]):.3f} s"
+        first = f"first at {samples.seconds(bad[0]):.3f} s"
+        what = f"{name} is not finite (NaN or inf) at {bad.size} of {signal.size} samples, {first}"
         seldom = is_seldom(signal)
         if not repair:
-            way = f"bring {name}, which has a value in some rows only, onto the others' times" if seldom else "fill or mark these samples"
+            way = (
+                f"bring {name}, which has a value in some rows only, onto the others' times"
+                if seldom
+                else "fill or mark these samples"
+            )
             raise BagError(where, what, f"{way} with --repair, or record again")
         lost = 0 if seldom else int(bad.size)
         if finite.sum() < MIN_SAMPLES or lost > _LOST * signal.size:
@@ -295,7 +300,9 @@ def _order(where: object, samples: Samples, repair: bool, otherwise: str) -> Non
         remedy = "give the time as a period in the mapping, or export it with more digits" if not otherwise else "record again"
         raise BagError(where, f"{100 * share:.0f} % of the stamps go back or repeat an earlier one: too many to drop", remedy)
     if share > _HOLD_BROKEN and samples.hold != "linear":
-        samples.notes.append(f"the effort was held from stamp to stamp ({samples.hold}); with so many dropped it no longer is: linear")
+        samples.notes.append(
+            f"the effort was held from stamp to stamp ({samples.hold}); with so many dropped it no longer is: linear"
+        )
         samples.hold = "linear"
     samples.keep(~(back | again))
 

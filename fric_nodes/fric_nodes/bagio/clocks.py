@@ -3,11 +3,12 @@
 A signal sampled at its own times s_j with values x_j is wanted at the times t_i of the others.
 
 - A motion (position, velocity, reference) is smooth: the cubic spline through its samples.
-- A force that is held from s_j to s_(j+1) and acts, on the new base, from t_i to t_(i+1) gives the same impulse when its value is
-  the mean of the held one over that interval.
-- A force that was logged more seldom than its controller ran is not held between its samples: the straight line between them comes
-  nearest, and each of the new values is then held over one step of the new base. Which of the two a force is can't be told from its
-  samples. The motion tells: of both, that which the equation of motion u = m a + d v + c sgn v + k q + b explains better is taken.
+- A force that is held from s_j to s_(j+1) and acts, on the new base, from t_i to t_(i+1) gives the same impulse when its value
+  is the mean of the held one over that interval.
+- A force that was logged more seldom than its controller ran is not held between its samples: the straight line between them
+  comes nearest, and each of the new values is then held over one step of the new base. Which of the two a force is can't be
+  told from its samples. The motion tells: of both, that which the equation of motion u = m a + d v + c sgn v + k q + b
+  explains better is taken.
 - Anything else: the straight line.
 """
 
@@ -89,7 +90,7 @@ def _force(base: Array, own: Array, values: Array, hold: str, slower: bool, posi
     if position is None or not np.all(np.isfinite(position)):
         return line, "by the line between its samples"
     inside = (base >= own[0]) & (base <= own[-1])
-    window = 2 * int(round(float(np.median(np.diff(own)) / np.median(np.diff(base))))) + 1
+    window = 2 * round(float(np.median(np.diff(own)) / np.median(np.diff(base)))) + 1
     # The motion's derivatives at t_i belong to the force around t_i: the mean of the steps on either side of it.
     other = -1 if hold == "following" else 1
     around = [0.5 * (force + np.roll(force, -other)) for force in (line, held)]
@@ -117,8 +118,8 @@ def as_held(base: Array, own: Array, values: Array, hold: str) -> Array:
 def explained(time: Array, position: Array, force: Array, window: int) -> float:
     """What the equation of motion leaves of a force while it slides one way, RMS as a share of the force's own.
 
-    All of it is smoothed alike, by two means over ``window`` samples; where the motion turns round or rests within them, or is slower
-    than a twentieth of its RMS speed, the friction isn't that of sliding and the samples don't count.
+    All of it is smoothed alike, by two means over ``window`` samples; where the motion turns round or rests within them, or is
+    slower than a twentieth of its RMS speed, the friction isn't that of sliding and the samples don't count.
     """
     step = float(np.median(np.diff(time)))
     if time.size < 8 * window:

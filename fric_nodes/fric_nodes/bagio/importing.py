@@ -48,7 +48,8 @@ def import_recording(
     """Read a file of another program.
 
     Args:
-        file: any that :mod:`fric_nodes.importers` reads: ``.mat`` (up to version 7), ``.csv``, ``.txt``, ``.json``, ``.npz``, ...
+        file: any that :mod:`fric_nodes.importers` reads: ``.mat`` (up to version 7), ``.csv``, ``.txt``, ``.json``, ``.npz``,
+            ...
         mapping: where each signal comes from; a YAML file, a dictionary or a mapping.
         repair: as for :func:`fric_nodes.bagio.read_record`.
         delimiter: between the columns of a text file; like the next three it goes before what the mapping says.
@@ -121,7 +122,9 @@ class _Import:
         short = next((name for name, signal in together.items() if signal.size != time.size), None)
         if short is not None:
             what = f"signal '{short}' has {together[short].size} samples, time has {time.size}"
-            remedy = f"map columns of one length, or give {short} a time of its own in the mapping: time: {{from: NAME, unit: s}}"
+            remedy = (
+                f"map columns of one length, or give {short} a time of its own in the mapping: time: {{from: NAME, unit: s}}"
+            )
             raise ImportingError(self.path, what, remedy)
         explain_clocks(self._table(None), self._columns(), together, self.options)
         position_unit = self._position_unit()
@@ -163,7 +166,9 @@ class _Import:
         """What the mapping takes from columns of the main file, by signal, those with a time of their own left out."""
         entries: dict[str, SignalMap | PeriodMap] = {"time": self.mapping.time, **self.named}
         plain = {name: entry for name, entry in entries.items() if isinstance(entry, SignalMap)}
-        return {name: Taken(entry.source, entry.unit) for name, entry in plain.items() if entry.file is None and entry.time is None}
+        return {
+            name: Taken(entry.source, entry.unit) for name, entry in plain.items() if entry.file is None and entry.time is None
+        }
 
     def _raw(self, name: str, entry: SignalMap, file: str | None = None) -> Array:
         """A signal in SI units, without what is taken away from it."""
@@ -188,7 +193,9 @@ class _Import:
         if entry.minus is None:
             return values
         if entry.minus.time is not None:
-            raise ImportingError(self.path, f"what is taken away from '{name}' has a time of its own", "give both the same time")
+            raise ImportingError(
+                self.path, f"what is taken away from '{name}' has a time of its own", "give both the same time"
+            )
         own = self.si[name]
         taken = self._signal(name, entry.minus)
         if self.si[name] != own or taken.shape != values.shape:
@@ -249,14 +256,14 @@ class _Import:
             samples.signals[name] = placed.values
             samples.valid = samples.valid & ~placed.bridged
             step = float(np.median(np.diff(own)))
-            self.notes.append(
-                f"{name} has {own.size} samples at a time of its own (every {step * 1e3:.4g} ms): brought onto the others' {placed.how}"
-                + (f"; {int(placed.bridged.sum())} samples in its gaps marked as not to be used" if placed.bridged.any() else "")
-            )
+            what = f"{name} has {own.size} samples at a time of its own (every {step * 1e3:.4g} ms)"
+            gaps = f"; {int(placed.bridged.sum())} samples in its gaps marked as not to be used" if placed.bridged.any() else ""
+            self.notes.append(f"{what}: brought onto the others' {placed.how}{gaps}")
         if not outside.any():
             return
         if np.count_nonzero(outside) > 0.5 * base.size:
-            problem = f"signals with a time of their own cover only {base.size - int(outside.sum())} of {base.size} samples of the others"
+            covered = f"only {base.size - int(outside.sum())} of {base.size} samples of the others"
+            problem = f"signals with a time of their own cover {covered}"
             raise ImportingError(self.path, problem, "map times of one clock, in the right unit")
         samples.keep(~outside)
         self.notes.append(f"{int(outside.sum())} samples that not all signals cover left out")
@@ -266,7 +273,7 @@ class _Import:
         if own.size != values.size:
             problem = f"signal '{name}' has {values.size} samples, its own time has {own.size}"
             raise ImportingError(self.path, problem, "map columns of one length")
-        last = int(np.max(np.flatnonzero(np.isfinite(own) | np.isfinite(values)), initial=-1)) + 1
+        last = int(np.max(np.flatnonzero(np.isfinite(values)), initial=-1)) + 1
         own, values = own[:last], values[:last]
         good = np.isfinite(own) & np.isfinite(values)
         newest = np.maximum.accumulate(np.where(good, own, -np.inf)) if last else own
@@ -276,7 +283,9 @@ class _Import:
         if wrong:
             what = f"signal '{name}' has {wrong} of {last} samples without a value, or whose own time doesn't increase"
             if not repair or wrong > 0.5 * last:
-                remedy = "drop these samples with --repair, or correct the file" if wrong <= 0.5 * last else "map the right columns"
+                remedy = (
+                    "drop these samples with --repair, or correct the file" if wrong <= 0.5 * last else "map the right columns"
+                )
                 raise ImportingError(self.path, what, remedy)
             self.notes.append(f"{what}: dropped")
         own, values = own[good & later], values[good & later]

@@ -47,8 +47,8 @@ class SignalMap(_Strict):
         offset: added after the factor [unit].
         file: another file, relative to the folder of the main one.
         minus: a signal that is taken away from it, such as the force of a pressure from all that a load cell measures.
-        time: its own time, where it was not sampled together with the others; on the same clock as the time of the mapping, or, given
-            as a period, from the same start.
+        time: its own time, where it was not sampled together with the others; on the same clock as the time of the mapping,
+            or, given as a period, from the same start.
     """
 
     source: str | int = Field(alias="from")

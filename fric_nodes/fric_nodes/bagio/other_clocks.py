@@ -1,7 +1,7 @@
 """Signals of one file that turn out to have different clocks, though the mapping gives them one time.
 
-Scopes and data loggers write a column of time beside each signal. With signals of different rates the shorter ones end early, and
-with the same number of rows nothing is amiss but that the rows were not taken together. Both show in the file.
+Scopes and data loggers write a column of time beside each signal. With signals of different rates the shorter ones end early,
+and with the same number of rows nothing is amiss but that the rows were not taken together. Both show in the file.
 """
 
 from __future__ import annotations

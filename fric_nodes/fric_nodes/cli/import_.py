@@ -36,11 +36,10 @@ def import_(
 ) -> None:
     """Turn a recording into a rosbag2 that every other verb reads.
 
-    The mapping names time, effort, and position or velocity; reference, normal_load, temperature and extra signals may follow. Only
-    the columns that it names are judged. A signal that was sampled at other times has a time of its own, as in
-    effort: {from: torque, unit: N m, time: {from: t2, unit: ms}}.
-    Its effort_hold says when a force acts: following (a controller's output, held from its stamp to the next), preceding, or
-    linear (measured, or nothing is known; the default).
+    The mapping names time, effort, and position or velocity; reference, normal_load, temperature and extra signals may follow.
+    Only the columns that it names are judged. A signal that was sampled at other times has a time of its own, as in effort:
+    {from: torque, unit: N m, time: {from: t2, unit: ms}}. Its effort_hold says when a force acts: following (a controller's
+    output, held from its stamp to the next), preceding, or linear (measured, or nothing is known; the default).
     """
     from ..bagio.importing import import_recording
     from ..bagio.mapping import load_mapping

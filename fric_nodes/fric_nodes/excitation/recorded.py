@@ -21,6 +21,7 @@ from ..record import Array
 
 __all__ = ["EXCITATION"]
 
+
 def _load(file: str, signal: str, joint: str) -> tuple[Array, Array]:
     """Time from 0 [s], evenly spaced, and the signal, each of shape ``(n_samples,)``."""
     # Slow to import, and only this excitation reads files.

@@ -17,9 +17,11 @@ import numpy as np
 
 from ..record import Array
 
-__all__ = ["DAY", "MISSING", "are_clocks", "clock", "comma_is", "first_bad", "is_clock", "number", "numbers", "past_midnight"]
+__all__ = ["DAY", "MISSING", "clock", "comma_is", "first_bad", "is_clock", "midnight_of", "number", "numbers", "past_midnight"]
 
-MISSING = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none", "nil", "-", "--", "?", "1.#qnan", "-1.#ind", "nan(ind)", "-nan"})
+MISSING = frozenset(
+    {"", "nan", "na", "n/a", "#n/a", "null", "none", "nil", "-", "--", "?", "1.#qnan", "-1.#ind", "nan(ind)", "-nan"}
+)
 _INFINITE = {"inf": np.inf, "+inf": np.inf, "-inf": -np.inf, "infinity": np.inf, "-infinity": -np.inf, "1.#inf": np.inf}
 _PLAIN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][+-]?[0-9]+)?$")
 _GROUPED = {
@@ -29,7 +31,9 @@ _GROUPED = {
     )
     for decimal, group in ((".", ","), (",", "."))
 }
-_CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d|\d\d?\.\d\d?\.\d{4}|\d{4}/\d\d/\d\d)[T ])?(\d{1,2}):(\d\d):(\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?$")
+_CLOCK = re.compile(
+    r"(?:(\d{4}-\d\d-\d\d|\d\d?\.\d\d?\.\d{4}|\d{4}/\d\d/\d\d)[T ])?(\d{1,2}):(\d\d):(\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?$"
+)
 _DAYS = ("%Y-%m-%d", "%d.%m.%Y", "%Y/%m/%d")
 DAY = 86_400.0  # [s]
 _QUOTES = "\"' \t\u00a0"
@@ -60,16 +64,25 @@ def number(cell: str, decimal: str = ".") -> float | None:
     return None
 
 
-def clock(cell: str) -> float | None:
-    """Seconds since midnight or since 1970 of a clock time, NaN where there is none, None for anything else."""
+def clock(cell: str, midnight: float = 0.0) -> float | None:
+    """A clock time [s], NaN where there is none, None for anything else.
+
+    Args:
+        cell: the text.
+        midnight: since when a date counts [s since 1970]; since 1970 itself, too few digits are left for what follows the
+            point.
+    """
     text = cell.strip(_QUOTES)
-    return float("nan") if text.lower() in MISSING else _clock(text) if ":" in text else None
+    return float("nan") if text.lower() in MISSING else _clock(text, midnight) if ":" in text else None
 
 
-def are_clocks(cells: Sequence[str]) -> bool:
-    """True when most of the cells that hold something are clock times."""
+def midnight_of(cells: Iterable[str]) -> float | None:
+    """The midnight before the first date of clock times [s since 1970], 0 without dates; None for another column."""
     filled = [cell for cell in cells if cell.strip(_QUOTES).lower() not in MISSING]
-    return 2 * sum(map(is_clock, filled)) > len(filled)
+    if not 2 * sum(map(is_clock, filled)) > len(filled):
+        return None
+    first = next(value for cell in filled if (value := clock(cell)) is not None)
+    return first // DAY * DAY
 
 
 def is_clock(cell: str) -> bool:
@@ -77,7 +90,7 @@ def is_clock(cell: str) -> bool:
     return ":" in cell and _CLOCK.match(cell.strip(_QUOTES)) is not None
 
 
-def _clock(text: str) -> float | None:
+def _clock(text: str, midnight: float) -> float | None:
     match = _CLOCK.match(text)
     if match is None:
         return None
@@ -91,20 +104,20 @@ def _clock(text: str) -> float | None:
         return seconds
     for form in _DAYS:
         try:
-            return datetime.strptime(day, form).replace(tzinfo=timezone.utc).timestamp() + seconds
+            return datetime.strptime(day, form).replace(tzinfo=timezone.utc).timestamp() - midnight + seconds
         except ValueError:
             continue
     return None
 
 
-def numbers(cells: Sequence[str], decimal: str = ".", clocks: bool = False) -> Array | None:
+def numbers(cells: Sequence[str], decimal: str = ".", midnight: float | None = None) -> Array | None:
     """The numbers of a column, or its clock times, NaN where there is none; None when a cell is neither."""
-    quick = None if clocks else _quick(cells, decimal)
+    quick = None if midnight is not None else _quick(cells, decimal)
     if quick is not None:
         return quick
     found = np.empty(len(cells))
     for index, cell in enumerate(cells):
-        value = clock(cell) if clocks else number(cell, decimal)
+        value = clock(cell, midnight) if midnight is not None else number(cell, decimal)
         if value is None:
             return None
         found[index] = value
@@ -136,9 +149,9 @@ def first_bad(cells: Sequence[str], clocks: bool = False) -> int:
 def comma_is(cells: Iterable[str]) -> str:
     """What a comma in the cells of one column is.
 
-    ``1,234`` may be 1.234 or 1234. The comma is a decimal sign where the digits behind it aren't three or nothing but a zero stands
-    before it, and where a number of four digits has none. It stands between thousands where a number has two, or a point behind it,
-    and where numbers below 1000 have none at all.
+    ``1,234`` may be 1.234 or 1234. The comma is a decimal sign where the digits behind it aren't three or nothing but a zero
+    stands before it, and where a number of four digits has none. It stands between thousands where a number has two, or a
+    point behind it, and where numbers below 1000 have none at all.
 
     Returns:
         ``","`` for a decimal sign, ``"."`` for thousands, ``"?"`` when both would do, and nothing when there is no comma.

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .cells import are_clocks, clock, number
+from .cells import clock, midnight_of, number
 from .errors import ImportingError, one_line
 from .lines import Line, encoding_of, lines_of
 from .table import Importer, Source, Table, TextOptions
@@ -43,7 +43,9 @@ def read(path: Path, options: TextOptions, wanted: Sequence[Source]) -> Table:
             _records(table, _by_line(table, encoding, options))
             return table
         what = f"line {error.lineno}, column {error.colno}: not JSON ({one_line(error.msg)})"
-        raise ImportingError(path, what, "export it again; one object a line is read from a file that ends in .jsonl") from error
+        raise ImportingError(
+            path, what, "export it again; one object a line is read from a file that ends in .jsonl"
+        ) from error
     except (OSError, ValueError, RecursionError) as error:
         raise ImportingError(path, f"is not readable JSON ({one_line(error)})", "export it again") from error
     if isinstance(content, list) and content and all(isinstance(entry, dict) for entry in content):
@@ -149,23 +151,23 @@ def _float(value: Any) -> float:
 
 
 def _column(table: Table, name: str, values: list[Any], places: Sequence[int], place: str) -> None:
-    clocks = are_clocks([value if isinstance(value, str) else "0" for value in values[:50] if value is not None])
+    midnight = midnight_of([value if isinstance(value, str) else "0" for value in values[:50] if value is not None])
     found = np.full(len(values), np.nan)
     for index, value in enumerate(values):
         if value is None:
             continue
         if isinstance(value, str):
-            parsed = clock(value) if clocks else number(value)
+            parsed = clock(value, midnight) if midnight is not None else number(value)
         else:
-            parsed = None if clocks or isinstance(value, (bool, dict, list)) else _float(value)
+            parsed = None if midnight is not None or isinstance(value, (bool, dict, list)) else _float(value)
         if parsed is None:
             what = f"{place} {places[index]}: '{one_line(value)}' is not a number"
             table.unusable[name] = (what, "map a column of numbers, or correct the file")
             return
         found[index] = parsed
     table.columns[name] = found
-    if clocks:
-        table.as_clock(name)
+    if midnight is not None:
+        table.as_clock(name, midnight)
 
 
 IMPORTER = Importer("json", (".json", *_LINES), read)

@@ -1,8 +1,9 @@
 """How a text table is written: delimiter, decimal sign, where the data begin, names of the columns.
 
-Every delimiter is tried on lines from the start, the middle and the end of the file. What counts is how many of these lines give
-numbers in the columns that the mapping asks for; what else a line holds (words, hexadecimal numbers, dates) doesn't matter. The
-decimal sign then follows from all cells of these columns together, see :func:`~fric_nodes.importers.cells.comma_is`.
+Every delimiter is tried on lines from the start, the middle and the end of the file. What counts is how many of these lines
+give numbers in the columns that the mapping asks for; what else a line holds (words, hexadecimal numbers, dates) doesn't
+matter. The decimal sign then follows from all cells of these columns together, see
+:func:`~fric_nodes.importers.cells.comma_is`.
 """
 
 from __future__ import annotations
@@ -86,7 +87,9 @@ def find_layout(path: Path, options: TextOptions, wanted: Sequence[Source]) -> L
     if not found:
         how = "say how it is written (delimiter, decimal, skip_rows, header), or export the signals as numbers"
         raise ImportingError(path, "no delimiter splits its lines into numbers", how)
-    best = max(found, key=lambda one: (one.resolved and one.score > 0, one.score if one.resolved else 0, one.general, one.resolved))
+    best = max(
+        found, key=lambda one: (one.resolved and one.score > 0, one.score if one.resolved else 0, one.general, one.resolved)
+    )
     if best.ambiguous is not None and best.resolved:
         raise ImportingError(
             path,
@@ -116,7 +119,11 @@ def _candidate(
     body = [row for row in filled if len(row) == width]
     if width > 1 and all(not row[-1] for row in body):
         width -= 1  # the delimiter ends each line
-    mask = [k for k in range(width) if sum(_any_number(row[k]) for row in body) * 2 > sum(row[k].lower() not in MISSING for row in body)]
+    mask = [
+        k
+        for k in range(width)
+        if sum(_any_number(row[k]) for row in body) * 2 > sum(row[k].lower() not in MISSING for row in body)
+    ]
     if not mask:
         return None
     index = _start(first, delimiter, width, mask) if options.header is None else min(int(options.header), len(first) - 1)
@@ -162,7 +169,11 @@ def _shares(row: Sequence[str], width: int, mask: Sequence[int]) -> float:
 def _fits(row: Sequence[str], columns: Sequence[int], decimal: str) -> bool:
     cells = [row[k] for k in columns if k < len(row)]
     found = [clock(cell) if is_clock(cell) else number(cell, decimal) for cell in cells]
-    return bool(found) and all(value is not None for value in found) and any(value is not None and not math.isnan(value) for value in found)
+    return (
+        bool(found)
+        and all(value is not None for value in found)
+        and any(value is not None and not math.isnan(value) for value in found)
+    )
 
 
 def _decimal(cells: list[list[str]], columns: Sequence[int], mask: Sequence[int]) -> tuple[str, str | None]:
@@ -173,7 +184,9 @@ def _decimal(cells: list[list[str]], columns: Sequence[int], mask: Sequence[int]
         return ("," if "," in verdicts else "."), None
     if not verdicts:
         return ".", None
-    unsure = next(cell for column, part in zip(columns, cells, strict=True) if said.get(column) == "?" for cell in part if "," in cell)
+    unsure = next(
+        cell for column, part in zip(columns, cells, strict=True) if said.get(column) == "?" for cell in part if "," in cell
+    )
     return ",", unsure
 
 

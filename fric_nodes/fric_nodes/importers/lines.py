@@ -46,7 +46,9 @@ def encoding_of(path: Path) -> str:
     for block, edges in ((head, (0, 3)), (tail, (3, 0))):
         # A letter of several bytes may be cut at the edge of a block.
         try:
-            block[edges[0] if len(tail) == _BLOCK else 0 : len(block) - (edges[1] if len(head) == _BLOCK else 0)].decode("utf-8")
+            block[edges[0] if len(tail) == _BLOCK else 0 : len(block) - (edges[1] if len(head) == _BLOCK else 0)].decode(
+                "utf-8"
+            )
         except UnicodeDecodeError:
             return "cp1252"
     return "utf-8"

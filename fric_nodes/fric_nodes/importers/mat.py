@@ -1,8 +1,8 @@
 """``.mat`` up to version 7: variables, fields of structs by dots, elements of struct arrays and cells by ``[0]``, ``[1]`` ...
 
 Simulink's "Structure With Time" is ``ScopeData.time`` and ``ScopeData.signals[0].values``; a matrix of values is
-``ScopeData.signals[0].values[0]`` and so on, one per column. What MATLAB stores as objects (timetable, timeseries, table) is opaque
-to every other program and is named with what to do.
+``ScopeData.signals[0].values[0]`` and so on, one per column. What MATLAB stores as objects (timetable, timeseries, table) is
+opaque to every other program and is named with what to do.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """The values of a MATLAB file of version 4 to 7, read so that a damaged file can't do harm.
 
-Source: MAT-File Format (MathWorks, R2022b), "Level 5 MAT-File Format" and "Level 4 MAT-File Format". A file of level 5 is a header of
-128 bytes and elements, each a tag of type and length and its data, padded to eight bytes; an array is an element that holds others:
-flags, dimensions, name, and then numbers, cells, or the fields of structs. A file of level 4 is a sequence of matrices, each with a
-header of five integers.
+Source: MAT-File Format (MathWorks, R2022b), "Level 5 MAT-File Format" and "Level 4 MAT-File Format". A file of level 5 is a
+    header of
+128 bytes and elements, each a tag of type and length and its data, padded to eight bytes; an array is an element that holds
+others: flags, dimensions, name, and then numbers, cells, or the fields of structs. A file of level 4 is a sequence of
+matrices, each with a header of five integers.
 
 Every length is held against what is there before anything is read or reserved; nothing is trusted that the file says of itself.
 """

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..record import Array
-from .cells import DAY, are_clocks, first_bad, numbers, past_midnight
+from .cells import first_bad, midnight_of, numbers, past_midnight
 from .errors import ImportingError, one_line
 
 __all__ = ["Importer", "Source", "Table", "TextOptions", "closest"]
@@ -48,8 +48,8 @@ class Table:
         path: the file.
         columns: numeric columns by name, each of shape ``(n_samples,)``.
         scalars: single numbers by name.
-        clocks: columns that are clock times or dates, in seconds whatever a mapping says, and since when [s since 1970]: a number
-            since then would leave too few digits for what comes after the point.
+        clocks: columns that are clock times or dates, in seconds whatever a mapping says, and since when [s since 1970]: a
+            number since then would leave too few digits for what comes after the point.
         unusable: names that are there but can't be used, with the reason and what to do.
         aliases: further names of columns.
         notes: what was dropped or taken as missing on the way, and why.
@@ -103,23 +103,24 @@ class Table:
 
     def add_cells(self, name: str, cells: Sequence[str], lines: Sequence[int] | None = None) -> None:
         """Take texts as a column when they are numbers or clock times, and as unusable when they aren't."""
-        clocks = are_clocks(cells[:50])
-        found = numbers(cells, clocks=clocks)
+        midnight = midnight_of(cells[:50])
+        found = numbers(cells, midnight=midnight)
         if found is None:
-            at = first_bad(cells, clocks)
+            at = first_bad(cells, midnight is not None)
             place = f"line {lines[at]}" if lines is not None else f"row {at}"
-            self.unusable[name] = (f"{place}: '{one_line(cells[at])}' is not a number", "map a column of numbers, or correct the file")
+            self.unusable[name] = (
+                f"{place}: '{one_line(cells[at])}' is not a number",
+                "map a column of numbers, or correct the file",
+            )
             return
         self.columns[name] = found
-        if clocks:
-            self.as_clock(name)
+        if midnight is not None:
+            self.as_clock(name, midnight)
 
-    def as_clock(self, name: str) -> None:
-        """Take a column as clock times [s since midnight or 1970]."""
-        times = past_midnight(self.columns[name])
-        known = times[np.isfinite(times)]
-        self.clocks[name] = float(np.floor(known[0] / DAY)) * DAY if known.size else 0.0
-        self.columns[name] = times - self.clocks[name]
+    def as_clock(self, name: str, midnight: float) -> None:
+        """Take a column as clock times since ``midnight`` [s since 1970]."""
+        self.columns[name] = past_midnight(self.columns[name])
+        self.clocks[name] = midnight
 
     def find(self, signal: str, source: Source) -> str:
         """The name of the column that a mapping asks for, by its name or its number from 0.

@@ -1,7 +1,7 @@
 """Text tables: ``.csv`` and the like, of any delimiter, decimal sign and header.
 
-Only the columns that a mapping asks for are judged. A file in which every line has the same number of cells goes through pyarrow's
-reader, which refuses whatever isn't as expected; then each line is looked at by itself. A line is
+Only the columns that a mapping asks for are judged. A file in which every line has the same number of cells goes through
+pyarrow's reader, which refuses whatever isn't as expected; then each line is looked at by itself. A line is
 
 - blank, or a comment (``#``, ``%``, ``//``, ``;``, ``!``): passed over;
 - data: as many cells as most lines have, numbers or nothing in the columns that are asked for;
@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from ..record import Array
-from .cells import MISSING, are_clocks, clock, is_clock, number, numbers
+from .cells import MISSING, clock, is_clock, midnight_of, number, numbers
 from .errors import ImportingError, one_line
 from .layout import Layout, find_layout
 from .lines import Line, is_comment, last_lines, lines_of, split
@@ -46,11 +46,16 @@ def read(path: Path, options: TextOptions, wanted: Sequence[Source]) -> Table:
         ImportingError: no numbers in it, or lines or cells of the columns asked for that can't be read.
     """
     layout = find_layout(path, options, wanted)
-    table = Table(path, order=layout.names, aliases=layout.aliases, head=[[_or_nan(number(cell, layout.decimal)) for cell in row] for row in layout.head])
+    table = Table(
+        path,
+        order=layout.names,
+        aliases=layout.aliases,
+        head=[[_or_nan(number(cell, layout.decimal)) for cell in row] for row in layout.head],
+    )
     chosen = list(layout.wanted) if wanted else list(range(layout.width))
     if wanted and not chosen:
         return _only_names(table, layout)
-    clocks = {index for index in chosen if are_clocks([row[index] for row in layout.head if index < len(row)])}
+    clocks = {index: midnight_of([row[index] for row in layout.head if index < len(row)]) for index in chosen}
     columns = _in_one_go(path, layout, chosen) if path.stat().st_size > _SMALL else None
     if columns is None:
         columns = _line_by_line(path, layout, chosen, clocks, table, options.repair, bool(wanted))
@@ -58,8 +63,8 @@ def read(path: Path, options: TextOptions, wanted: Sequence[Source]) -> Table:
     for index, values in zip(chosen, columns, strict=True):
         name = layout.names[index]
         table.columns[name] = values
-        if index in clocks:
-            table.as_clock(name)
+        if (midnight := clocks[index]) is not None:
+            table.as_clock(name, midnight)
     return table
 
 
@@ -150,13 +155,13 @@ class _Reader:
     Args:
         layout: how it is written.
         chosen: numbers of the columns.
-        clocks: those of them that are clock times.
+        clocks: of those of them that are clock times, since when they count.
         judged: False to take a cell that is no number as missing in silence, when no column was asked for.
     """
 
-    def __init__(self, layout: Layout, chosen: list[int], clocks: set[int], judged: bool) -> None:
+    def __init__(self, layout: Layout, chosen: list[int], clocks: dict[int, float | None], judged: bool) -> None:
         self.layout, self.chosen, self.judged = layout, chosen, judged
-        self.clocks = [index in clocks for index in chosen]
+        self.midnights = [clocks[index] for index in chosen]
         self.messages, self.cells, self.cut, self.pending = _Trouble(), _Trouble(), _Trouble(), _Trouble()
         self.bad_column = ""
         self.bad = [0] * len(chosen)
@@ -230,7 +235,7 @@ class _Reader:
 
     def _converted(self, rows: _Rows, kept: Any) -> list[Array]:
         decimal = self.layout.decimal
-        columns = [numbers(cells, decimal, timed) for cells, timed in zip(rows.cells, self.clocks, strict=True)]
+        columns = [numbers(cells, decimal, since) for cells, since in zip(rows.cells, self.midnights, strict=True)]
         if all(column is not None for column in columns):
             self._settle(bool(rows.lines))
             return [column for column in columns if column is not None]
@@ -238,7 +243,8 @@ class _Reader:
         found = [np.empty(count) for _ in self.chosen]
         for k in range(count):
             cells = [column[k] for column in rows.cells]
-            values = [clock(cell) if timed else number(cell, decimal) for cell, timed in zip(cells, self.clocks, strict=True)]
+            pairs = zip(cells, self.midnights, strict=True)
+            values = [number(cell, decimal) if since is None else clock(cell, since) for cell, since in pairs]
             wrong = [index for index, value in enumerate(values) if value is None]
             if wrong and self.judged and self._message(Line(rows.lines[k], rows.text[k]), cells, whole=True):
                 kept[k] = False
@@ -267,7 +273,7 @@ class _Reader:
 
 
 def _line_by_line(
-    path: Path, layout: Layout, chosen: list[int], clocks: set[int], table: Table, repair: bool, judged: bool
+    path: Path, layout: Layout, chosen: list[int], clocks: dict[int, float | None], table: Table, repair: bool, judged: bool
 ) -> list[Array]:
     reader = _Reader(layout, chosen, clocks, judged)
     lines = lines_of(path, layout.encoding, layout.delimiter, layout.start)
@@ -280,7 +286,10 @@ def _line_by_line(
     else:
         for index, bad in zip(chosen, reader.bad, strict=True):
             if bad:
-                table.unusable[layout.names[index]] = ("holds what is no number", "map a column of numbers, or correct the file")
+                table.unusable[layout.names[index]] = (
+                    "holds what is no number",
+                    "map a column of numbers, or correct the file",
+                )
     return columns
 
 
@@ -289,15 +298,21 @@ def _judge(path: Path, reader: _Reader, table: Table, repair: bool) -> None:
     cells, cut, messages = reader.cells, reader.cut, reader.messages
     for index, bad in enumerate(reader.bad):
         if 2 * bad > reader.samples:
-            name = reader.layout.names[reader.chosen[index]]
-            problem = f"column '{one_line(name)}' is no column of numbers: {bad} of {reader.samples} cells, such as '{one_line(cells.text)}'"
+            name = one_line(reader.layout.names[reader.chosen[index]])
+            which = f"{bad} of {reader.samples} cells, such as '{one_line(cells.text)}'"
+            problem = f"column '{name}' is no column of numbers: {which}"
             raise ImportingError(path, problem, "map another column, or say how it is written: delimiter, decimal")
     if not reader.samples or messages.count > reader.samples:
         trouble = messages if messages.count else reader.pending
-        problem = f"{trouble.count} of its lines hold no numbers where the mapping asks for them, first line {trouble.line}: '{one_line(trouble.text)}'"
+        first = f"first line {trouble.line}: '{one_line(trouble.text)}'"
+        problem = f"{trouble.count} of its lines hold no numbers where the mapping asks for them, {first}"
         raise ImportingError(path, problem, "say how it is written (delimiter, decimal, skip_rows), or remove these lines")
     found = (
-        (cells, f"column '{one_line(reader.bad_column)}', line {cells.line}: '{one_line(cells.text)}' is not a number", "taken as missing"),
+        (
+            cells,
+            f"column '{one_line(reader.bad_column)}', line {cells.line}: '{one_line(cells.text)}' is not a number",
+            "taken as missing",
+        ),
         (cut, f"line {cut.line} has too few or too many cells: '{one_line(cut.text)}'", "taken as missing what can't be told"),
         (messages, f"line {messages.line} is a message between the data: '{one_line(messages.text)}'", "dropped"),
     )
@@ -313,7 +328,9 @@ def _judge(path: Path, reader: _Reader, table: Table, repair: bool) -> None:
         table.notes.append(f"{reader.comments} comment line(s) passed over")
     if reader.pending.count:
         last = reader.pending
-        table.notes.append(f"{last.count} line(s) after the data passed over, the first line {last.line}: '{one_line(last.text)}'")
+        table.notes.append(
+            f"{last.count} line(s) after the data passed over, the first line {last.line}: '{one_line(last.text)}'"
+        )
 
 
 def _last_line(path: Path, layout: Layout, chosen: list[int], columns: list[Array], table: Table) -> None:

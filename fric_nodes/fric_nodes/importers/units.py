@@ -1,9 +1,9 @@
 """Units of imported files, converted to SI at this edge and nowhere else.
 
-A text such as ``N s/m``, ``mm/s²``, ``kN/mm`` or ``deg/s`` is a product of powers of symbols. Each symbol has a factor to SI and
-exponents of the base quantities mass, length, time, angle, current, temperature and those that SI leaves without a unit (per
-cent, counts); the exponents of the product say what it measures. Angle counts as a base quantity of its own, so that ``rad/s``
-isn't a frequency. Factors are the exact ones of the SI brochure (9th edition) and of NIST SP 811, appendix B.
+A text such as ``N s/m``, ``mm/s²``, ``kN/mm`` or ``deg/s`` is a product of powers of symbols. Each symbol has a factor to SI
+and exponents of the base quantities mass, length, time, angle, current, temperature and those that SI leaves without a unit
+(per cent, counts); the exponents of the product say what it measures. Angle counts as a base quantity of its own, so that
+``rad/s`` isn't a frequency. Factors are the exact ones of the SI brochure (9th edition) and of NIST SP 811, appendix B.
 """
 
 from __future__ import annotations
@@ -189,8 +189,8 @@ def unit(text: str, *wanted: str) -> Unit | None:
 
     Args:
         text: as written in a mapping or a header.
-        wanted: quantities that are expected. ``g`` is a gram, or standard gravity where an acceleration is expected; ``1/min`` is
-            a frequency, or turns per minute where an angular speed is.
+        wanted: quantities that are expected. ``g`` is a gram, or standard gravity where an acceleration is expected; ``1/min``
+            is a frequency, or turns per minute where an angular speed is.
     """
     plain = text.strip().replace("\u00b5", "u").replace("\u03bc", "u").translate(_SUPERSCRIPTS)
     if "angular speed" in wanted and plain in {"1/min", "min^-1", "/min"}:
@@ -236,7 +236,7 @@ def _power(symbol: str) -> tuple[float, Exponents] | None:
     match = _FACTOR.match(symbol)
     if match is None:
         return None
-    base = _symbol(symbol) or _symbol(match[1])
+    base = _symbol(symbol) or (_symbol(match[1]) if match[1] not in {"1", "-"} else None)
     power = int(match[2]) if match[2] and _symbol(symbol) is None else 1
     if base is None:
         return None
