@@ -84,6 +84,25 @@ def test_the_same_numbers_however_they_are_written(imported: Any, content: str |
     same(imported(content))
 
 
+@pytest.mark.parametrize(
+    ("write", "head", "effort"),
+    [
+        (lambda t, q, u, k: f"{t:.3f},{q:.6f},{k},{u:.3f}", "t,q,count,u\n", "u"),
+        (lambda t, q, u, k: f"{t:.3f},{q:.6f},{u:.3f},{'overrun' if k == 50 else ''}", "t,q,u,message\n", "u"),
+        (lambda t, q, u, k: f"{t:.3f},{q:.6f},{u:.3f},0,0", "Time,Axis1,,Axis2,\nt,q,u,q,u\n", "Axis1.u"),
+    ],
+)
+def test_what_stands_beside_the_signals(imported: Any, write: Any, head: str, effort: str) -> None:
+    """A counter that isn't a clock, words in a few rows only, titles over several columns."""
+    by_group = {"position": {"from": "Axis1.q", "unit": "m"}} if "." in effort else {}
+    same(imported(rows(write, head), effort={"from": effort, "unit": "N"}, **by_group))
+
+
+def test_names_that_do_not_fit_the_columns_are_said(imported: Any) -> None:
+    with pytest.raises(InputError, match=r"'t', which is not there \(the line above the data has 3 names for 4 columns\)"):
+        imported(rows(lambda t, q, u, k: f"{k},{t:.3f},{q:.6f},{u:.3f}"))
+
+
 def test_a_large_file_is_read_as_a_small_one(imported: Any) -> None:
     lines = [f"{k * 1e-3:.3f},{'on' if k % 2 else 'off'},{np.sin(k * 1e-3):.6f},{k % 7}.5" for k in range(50_000)]
     record = imported("t,state,q,u\n" + "\n".join(lines))

@@ -6,6 +6,7 @@ and with the same number of rows nothing is amiss but that the rows were not tak
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -90,10 +91,20 @@ def refuse_pairs(table: Table, columns: Mapping[str, Taken], wanted: Sequence[So
         beside = rising[place]
         if place in asked or beside is None or time is None:
             continue
+        if not _named_alike(order[place], order[places["time"]], beside):
+            continue
         step = float(np.median(np.diff(time)))
         if np.max(np.abs(beside - time)) > 0.5 * step:
             problem = f"signals have different clocks: column '{one_line(order[place])}' is a time of its own of '{name}'"
             raise _refusal(table, problem, name, columns, place)
+
+
+def _named_alike(name: str, time: str, values: Array) -> bool:
+    """True when a column beside a signal is named like the time of the mapping, or has no name and doesn't just count rows."""
+    plain = [re.sub(r"\.\d+$|[\[(].*|[\d_\s]+", "", part).lower() for part in (name, time)]
+    if any(plain):
+        return plain[0] == plain[1] or "time" in plain[0] or plain[0] in {"t", "zeit"}
+    return not bool(np.all(np.diff(values) == 1.0))
 
 
 def _rises(head: Sequence[Sequence[float]], column: int) -> Array | None:

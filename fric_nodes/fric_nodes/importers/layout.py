@@ -41,6 +41,7 @@ class Layout:
         aliases: further names, such as those of other header lines.
         wanted: numbers of the columns that are asked for and there.
         head: cells of the first rows.
+        hint: why there are no names though there are lines above the data.
     """
 
     encoding: str
@@ -52,6 +53,7 @@ class Layout:
     aliases: dict[str, str] = field(default_factory=dict)
     wanted: tuple[int, ...] = ()
     head: list[list[str]] = field(default_factory=list)
+    hint: str = ""
 
 
 @dataclass
@@ -127,8 +129,16 @@ def _candidate(
     if not mask:
         return None
     index = _start(first, delimiter, width, mask) if options.header is None else min(int(options.header), len(first) - 1)
-    headers = [] if options.header is False else _headers([line.text for line in first[:index]], delimiter, width)
+    above = [] if options.header is False else [line.text for line in first[:index]]
+    if any(len(row := split(text, delimiter)) == width + 1 and row[-1] for text in above) and len(body[0]) > width:
+        width += 1  # the last column has a name, and is empty in most lines
+    headers = _headers(above, delimiter, width)
     names, aliases = _names(headers, width)
+    hint = (
+        f"the line above the data has {len(split(above[-1], delimiter))} names for {width} columns"
+        if above and not headers
+        else ""
+    )
     numbers = [_index(source, names, aliases) for source in wanted]
     resolved = all(column is not None for column in numbers)
     columns = sorted({column for column in numbers if column is not None})
@@ -139,7 +149,7 @@ def _candidate(
     # Without names that fit, what the mapping asks for can't be judged: the columns that hold numbers are.
     general = sum(len(row) == width and _fits(row, mask, decimal) for row in rows) / len(rows) * len(mask)
     start = first[index].at - 1
-    layout = Layout(encoding, delimiter, decimal, start, width, names, aliases, tuple(columns), data[:_HEAD])
+    layout = Layout(encoding, delimiter, decimal, start, width, names, aliases, tuple(columns), data[:_HEAD], hint)
     return _Candidate(layout, resolved, good, general, ambiguous)
 
 
@@ -219,7 +229,7 @@ def _telling(row: Sequence[str]) -> int:
 def _names(headers: list[list[str]], width: int) -> tuple[list[str], dict[str, str]]:
     """Names of the columns, from the header line that tells most of them apart, and what else each may be called."""
     numbered = [str(index) for index in range(width)]
-    texts = [row for row in headers if not _is_units(row)] or headers[:1]
+    texts = [row for row in headers if not _is_units(row)] or headers[-1:]  # names stand above their units
     if not texts:
         return numbered, {}
     # Where several lines tell as many apart, the nearest to the data counts.
@@ -229,14 +239,21 @@ def _names(headers: list[list[str]], width: int) -> tuple[list[str], dict[str, s
         name = cell.strip('"') or str(index)
         names.append(name if name not in names else f"{name}.{index}")
     others: dict[str, list[str]] = {}
-    for row in texts:
-        group = ""
-        for name, cell in zip(names, row, strict=True):
-            group = cell or group  # a title over several columns stands over the first
-            parts = {cell, cell.split("[")[0].strip(), cell.split("(")[0].strip(), f"{group}.{name}"} - {""}
-            for alias in parts:
+    for level, row in enumerate(texts):
+        groups = [_spread(upper) for upper in texts[level + 1 :]]
+        for column, (name, cell) in enumerate(zip(names, row, strict=True)):
+            under = {f"{group[column]}.{cell}" for group in groups}
+            for alias in {cell, cell.split("[")[0].strip(), cell.split("(")[0].strip(), *under} - {""}:
                 others.setdefault(alias, []).append(name)
     return names, {alias: found[0] for alias, found in others.items() if len(set(found)) == 1 and alias not in names}
+
+
+def _spread(row: Sequence[str]) -> list[str]:
+    """A header line whose titles stand over the first of several columns, repeated over all of them."""
+    spread: list[str] = []
+    for cell in row:
+        spread.append(cell or (spread[-1] if spread else ""))
+    return spread
 
 
 def _index(source: Source, names: list[str], aliases: dict[str, str]) -> int | None:

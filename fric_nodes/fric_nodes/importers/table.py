@@ -54,6 +54,7 @@ class Table:
         aliases: further names of columns.
         notes: what was dropped or taken as missing on the way, and why.
         order: names of all columns of a text table, as they are counted from 0.
+        hint: why names may be missing.
         head: the first rows of a text table, NaN for what is no number.
     """
 
@@ -65,6 +66,7 @@ class Table:
     aliases: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     order: list[str] = field(default_factory=list)
+    hint: str = ""
     head: list[list[float]] = field(default_factory=list)
 
     def add(self, name: str, values: Any) -> None:
@@ -138,10 +140,11 @@ class Table:
         if inside is not None:
             what, remedy = self.unusable[inside]
             raise ImportingError(self.path, f"signal '{signal}': '{inside}' {what}", remedy)
+        hint = f" ({self.hint})" if self.hint else ""
         near = closest(str(source), [*self.columns, *self.aliases])
         raise ImportingError(
             self.path,
-            f"signal '{signal}' is to come from '{one_line(source)}', which is not there{near}",
+            f"signal '{signal}' is to come from '{one_line(source)}', which is not there{near}{hint}",
             f"columns there: {_listed(self.order or list(self.columns))}",
         )
 

@@ -52,6 +52,7 @@ def read(path: Path, options: TextOptions, wanted: Sequence[Source]) -> Table:
         aliases=layout.aliases,
         head=[[_or_nan(number(cell, layout.decimal)) for cell in row] for row in layout.head],
     )
+    table.hint = layout.hint
     chosen = list(layout.wanted) if wanted else list(range(layout.width))
     if wanted and not chosen:
         return _only_names(table, layout)
