@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 import numpy as np
 import pytest
 from fric_nodes.errors import InputError
+from scipy.io import savemat
 
 
 def pairs(run: Any, every: int, late: float = 0.0, truncated: bool = False) -> str:
@@ -59,6 +61,27 @@ def test_a_clock_given_as_a_period_and_a_position_at_the_lower_rate(imported: An
     record = imported(content, time={"period": 1, "unit": "ms"}, position=position)
     assert record.sample_time == pytest.approx(1e-3)
     fitted(record)
+
+
+def test_two_scopes_of_different_rates(imported: Any, fitted: Any, run: Any) -> None:
+    """Simulink logs each scope at the rate of its block."""
+    stream = io.BytesIO()
+    scopes = [(run.t, run.q), (run.t[::4], run.u[::4])]
+    savemat(stream, {f"S{k}": {"time": t, "signals": {"values": x[:, None]}} for k, (t, x) in enumerate(scopes, 1)})
+    mapping: dict[str, Any] = {
+        "time": {"from": "S1.time", "unit": "s"},
+        "position": {"from": "S1.signals.values", "unit": "m"},
+        "effort": {"from": "S2.signals.values", "unit": "N"},
+    }
+    with pytest.raises(InputError, match="signals have different clocks") as refused:
+        imported(stream.getvalue(), "run.mat", **mapping)
+    assert "effort: {from: S2.signals.values, unit: N, time: {from: S2.time, unit: s}}" in str(refused.value)
+    mapping["effort"] = {**mapping["effort"], "time": {"from": "S2.time", "unit": "s"}}
+    fitted(imported(stream.getvalue(), "run.mat", **mapping))
+
+
+def test_times_beside_each_signal_that_agree_are_fine(imported: Any, run: Any) -> None:
+    assert imported(pairs(run, 1), "scope.txt", **SCOPE).n_samples == len(run.t)
 
 
 def seldom(run: Any, q_every: int, u_every: int, u_from: int = 0) -> str:

@@ -16,7 +16,7 @@ from ..record import Array, Mask, Record, Units
 from .checks import Samples, check_samples
 from .clocks import place
 from .mapping import ImportMap, PeriodMap, SignalMap, load_mapping
-from .other_clocks import Taken, explain_clocks, refuse_pairs
+from .other_clocks import Taken, explain_clocks, lengths_differ, refuse_pairs
 
 __all__ = ["import_recording"]
 
@@ -121,11 +121,8 @@ class _Import:
         time = self._time(together)
         short = next((name for name, signal in together.items() if signal.size != time.size), None)
         if short is not None:
-            what = f"signal '{short}' has {together[short].size} samples, time has {time.size}"
-            remedy = (
-                f"map columns of one length, or give {short} a time of its own in the mapping: time: {{from: NAME, unit: s}}"
-            )
-            raise ImportingError(self.path, what, remedy)
+            table = self._table(self.named[short].file)
+            raise lengths_differ(table, short, self._columns(), together[short].size, time.size)
         explain_clocks(self._table(None), self._columns(), together, self.options)
         position_unit = self._position_unit()
         time, together, start = self._finite_time(time, together, repair)

@@ -17,7 +17,7 @@ from ..importers.errors import one_line
 from ..importers.table import Source
 from ..record import Array
 
-__all__ = ["Taken", "explain_clocks", "refuse_pairs"]
+__all__ = ["Taken", "explain_clocks", "lengths_differ", "refuse_pairs"]
 
 _LEAST = 10  # rows that show whether a column is a clock
 
@@ -66,6 +66,29 @@ def explain_clocks(table: Table, columns: Mapping[str, Taken], signals: Mapping[
                 f"as column '{one_line(clock)}' beside it does, which rises throughout"
             )
             raise _refusal(table, problem, name, columns, order.index(clock) if everything.order else clock)
+
+
+def lengths_differ(table: Table, name: str, columns: Mapping[str, Taken], size: int, wanted: int) -> ImportingError:
+    """The error for a signal of another length than the time, with its own time where the file has one of its length."""
+    what = f"signal '{name}' has {size} samples, time has {wanted}"
+    taken = {table.name_of(column.source) for column in columns.values()}
+    clocks = [
+        column
+        for column, values in table.columns.items()
+        if column not in taken and values.size == size >= _LEAST and np.all(np.diff(values) > 0)
+    ]
+    if clocks and name in columns:
+        own = table.name_of(columns[name].source)
+        # That with most of the name in common: S2.time for S2.signals.values.
+        clock = max(clocks, key=lambda column: _alike(column, own))
+        return _refusal(table, f"signals have different clocks: {what}, as long as '{one_line(clock)}'", name, columns, clock)
+    remedy = f"map columns of one length, or give {name} a time of its own in the mapping: time: {{from: NAME, unit: s}}"
+    return ImportingError(table.path, what, remedy)
+
+
+def _alike(first: str, second: str) -> int:
+    """Letters that two names have in common from their start."""
+    return next((at for at, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), min(len(first), len(second)))
 
 
 def refuse_pairs(table: Table, columns: Mapping[str, Taken], wanted: Sequence[Source]) -> None:
