@@ -193,3 +193,10 @@ def test_numbers_beyond_all_numbers_are_said(imported: Any) -> None:
     with pytest.raises(InputError, match=r"effort is not finite \(NaN or inf\) at 1 of 60 samples, first at 0\.030 s"):
         imported(content)
     assert imported(content, repair=True).n_samples == N
+
+
+def test_a_line_of_numbers_apart_from_the_data_is_said(imported: Any) -> None:
+    lines = rows(plain).splitlines()
+    record = imported("\n".join([lines[0], lines[1], "Warn: 12, 13, x", *lines[2:]]))
+    assert record.n_samples == N - 1
+    assert any("line 2 above the data" in note for note in record.notes)

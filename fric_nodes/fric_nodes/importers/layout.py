@@ -41,6 +41,7 @@ class Layout:
         aliases: further names, such as those of other header lines.
         wanted: numbers of the columns that are asked for and there.
         head: cells of the first rows.
+        early: numbers of the lines of numbers that stand above the data, apart from them.
         hint: why there are no names though there are lines above the data.
     """
 
@@ -54,6 +55,7 @@ class Layout:
     wanted: tuple[int, ...] = ()
     head: list[list[str]] = field(default_factory=list)
     hint: str = ""
+    early: tuple[int, ...] = ()
 
 
 @dataclass
@@ -133,6 +135,8 @@ def _candidate(
     if any(len(row := split(text, delimiter)) == width + 1 and row[-1] for text in above) and len(body[0]) > width:
         width += 1  # the last column has a name, and is empty in most lines
     headers = _headers(above, delimiter, width)
+    rows_above = ((line.at, split(line.text, delimiter)) for line in first[:index] if not is_comment(line.text, delimiter))
+    early = () if options.header is not None else tuple(at for at, row in rows_above if _shares(row, width, mask) == 1.0)
     names, aliases = _names(headers, width)
     hint = (
         f"the line above the data has {len(split(above[-1], delimiter))} names for {width} columns"
@@ -149,7 +153,7 @@ def _candidate(
     # Without names that fit, what the mapping asks for can't be judged: the columns that hold numbers are.
     general = sum(len(row) == width and _fits(row, mask, decimal) for row in rows) / len(rows) * len(mask)
     start = first[index].at - 1
-    layout = Layout(encoding, delimiter, decimal, start, width, names, aliases, tuple(columns), data[:_HEAD], hint)
+    layout = Layout(encoding, delimiter, decimal, start, width, names, aliases, tuple(columns), data[:_HEAD], hint, early)
     return _Candidate(layout, resolved, good, general, ambiguous)
 
 

@@ -53,6 +53,9 @@ def read(path: Path, options: TextOptions, wanted: Sequence[Source]) -> Table:
         head=[[_or_nan(number(cell, layout.decimal)) for cell in row] for row in layout.head],
     )
     table.hint = layout.hint
+    if layout.early:
+        lines = f"line {layout.early[0]}" + (f" and {len(layout.early) - 1} more" if len(layout.early) > 1 else "")
+        table.notes.append(f"{lines} above the data, apart from them: not read, though of numbers")
     chosen = list(layout.wanted) if wanted else list(range(layout.width))
     if wanted and not chosen:
         return _only_names(table, layout)
