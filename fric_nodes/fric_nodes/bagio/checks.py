@@ -1,7 +1,13 @@
 """What makes a recording unusable, checked before anything else is done with it.
 
-Each finding is one line with file, cause and remedy. With ``repair`` the samples concerned are dropped or marked instead, and
-each thing done is said in the notes: what, how many, where, why. Nothing happens in silence.
+Each finding is one line with file, cause and remedy. With ``repair`` missing values are filled where the motion says what they
+were, and samples are marked or dropped where it doesn't; each thing done is said in the notes: what, how many, where, why.
+Nothing happens in silence, and a recording of which more than half would be lost is refused.
+
+Missing values: a signal that has one in every n-th row only was sampled at a rate of its own and is brought onto the others',
+see :mod:`.clocks`. In any other, up to three in a row are bridged: by the cubic through the samples around for a motion, by
+the line for a force. A fit uses frequencies up to about a tenth of the rate, and over four steps such a motion is a cubic to
+within a per mille. Longer stretches are marked as not to be used; those at the ends are left out.
 
 Terms: a *gap* is a step longer than ten median steps and than 50 ms; a shorter irregularity is jitter and is left alone. A
 *jump* is a step of more than 10 s forward, or a clock that starts again at an earlier time and goes on from there.
@@ -17,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..record import Array, Mask
+from .clocks import SMOOTH, is_seldom, place
 from .errors import BagError
 from .topics import Topic
 
@@ -28,6 +35,9 @@ MIN_SAMPLES = 10
 _JUMP_NS = 10_000_000_000
 _GAP_FLOOR_NS = 50_000_000
 _GAP_MEDIANS = 10
+_BRIDGED = 3  # missing values in a row that are filled, see above
+_LOST = 0.5  # of a recording: with more than this gone, what is left is another recording
+_HOLD_BROKEN = 0.1  # of the samples dropped: a force held over one step would then too often act over several
 _STRAY = 10  # a run of stamps shorter than this that fits nowhere is stray, not a part of the recording
 
 
@@ -40,12 +50,14 @@ class Samples:
         signals: by name, ``position`` and ``effort`` among them.
         valid: False where a sample must not be used.
         notes: what was done.
+        hold: of the effort, see :attr:`fric_nodes.record.Record.effort_hold`; ``linear`` when a repair broke what was declared.
     """
 
     time_ns: Stamps
     signals: dict[str, Array]
     valid: Mask
     notes: list[str] = field(default_factory=list)
+    hold: str = "linear"
 
     def keep(self, chosen: Mask | slice) -> None:
         """Leave out all but the chosen samples."""
@@ -142,10 +154,10 @@ def check_samples(where: object, samples: Samples, *, repair: bool, received: bo
         BagError: too short; or, without ``repair``, values that are not finite, stamps that go back, repeat or jump, gaps.
     """
     _enough(where, samples)
-    _finite(where, samples, repair)
     otherwise = ", or read by time of reception with --time log" if received else ""
     _jumps(where, samples, repair, otherwise)
     _order(where, samples, repair, otherwise)
+    _finite(where, samples, repair)
     _gaps(where, samples, repair)
     _enough(where, samples)
 
@@ -158,21 +170,77 @@ def _enough(where: object, samples: Samples) -> None:
 
 
 def _finite(where: object, samples: Samples, repair: bool) -> None:
-    good = np.ones(samples.time_ns.size, dtype=np.bool_)
-    for name, signal in samples.signals.items():
+    _enough(where, samples)
+    ends = np.ones(samples.time_ns.size, dtype=np.bool_)
+    marked = np.zeros(samples.time_ns.size, dtype=np.bool_)
+    # The motion first: by it, a force is judged.
+    for name in sorted(samples.signals, key=lambda name: name != "position"):
+        signal = samples.signals[name]
         finite = np.isfinite(signal)
         if finite.all():
             continue
         bad = np.flatnonzero(~finite)
-        first = samples.seconds(bad[0])
-        what = f"{name} is not finite (NaN or inf) at {bad.size} of {signal.size} samples, first at {first:.3f} s"
+        first = f"first at {samples.seconds(bad[0]):.3f} s"
+        what = f"{name} is not finite (NaN or inf) at {bad.size} of {signal.size} samples, {first}"
+        seldom = is_seldom(signal)
         if not repair:
-            raise BagError(where, what, "drop these samples with --repair, or record again")
-        samples.notes.append(f"{what}: dropped")
-        good &= finite
-    if not good.all():
-        samples.keep(good)
-        _enough(where, samples)
+            way = (
+                f"bring {name}, which has a value in some rows only, onto the others' times"
+                if seldom
+                else "fill or mark these samples"
+            )
+            raise BagError(where, what, f"{way} with --repair, or record again")
+        lost = 0 if seldom else int(bad.size)
+        if finite.sum() < MIN_SAMPLES or lost > _LOST * signal.size:
+            if name in {"position", "effort"}:
+                raise BagError(where, f"{what}: too many to repair", "record again, or map another column")
+            del samples.signals[name]
+            samples.notes.append(f"{what}: {name} left out")
+            continue
+        done, gap = _filled(name, samples, finite, seldom)
+        samples.notes.append(f"{what}: {done}")
+        marked |= gap
+        rows = np.flatnonzero(np.isfinite(samples.signals[name]))
+        ends[: rows[0]] = ends[rows[-1] + 1 :] = False
+    lost = int(np.count_nonzero(marked | ~ends))
+    if lost > _LOST * ends.size:
+        problem = f"{lost} of {ends.size} samples lack a value that could be told from those around"
+        raise BagError(where, problem, "record again, or map other columns")
+    samples.valid = samples.valid & ~marked
+    if not ends.all():
+        samples.notes.append(f"{int((~ends).sum())} samples at the ends, where a signal has no value yet or any more, left out")
+        samples.keep(ends)
+    _enough(where, samples)
+
+
+def _filled(name: str, samples: Samples, finite: Mask, seldom: bool) -> tuple[str, Mask]:
+    """Fill the missing values of a signal; what was done, and which samples must not be used."""
+    time = (samples.time_ns - samples.time_ns[0]) * 1e-9
+    signal = samples.signals[name]
+    if seldom:
+        placed = place(name, time, time[finite], signal[finite], samples.hold, samples.signals.get("position"))
+        samples.signals[name] = placed.values
+        every = float(np.median(np.diff(np.flatnonzero(finite))))
+        held = name == "effort" and samples.hold != "linear"
+        step = f"; from here on it counts as held over one step of {np.median(np.diff(time)) * 1e3:.4g} ms" if held else ""
+        return f"a value every {every:g} rows, filled {placed.how}{step}", placed.bridged
+    rows = np.flatnonzero(finite)
+    inside = ~finite
+    inside[: rows[0]] = inside[rows[-1] + 1 :] = False
+    run = np.diff(rows)[np.clip(np.searchsorted(rows, np.arange(signal.size)) - 1, 0, rows.size - 2)] - 1
+    short, long = inside & (run <= _BRIDGED), inside & (run > _BRIDGED)
+    values = np.where(inside, np.interp(time, time[finite], np.where(finite, signal, 0.0)[finite]), signal)
+    if name in SMOOTH and rows.size > 3 and short.any():
+        from scipy.interpolate import CubicSpline  # slow to import
+
+        values[short] = CubicSpline(time[finite], signal[finite])(time[short])
+    samples.signals[name] = values
+    parts = [
+        f"{short.sum()} filled from those around" if short.any() else "",
+        f"{long.sum()} in longer gaps marked as not to be used" if long.any() else "",
+        f"{signal.size - finite.sum() - inside.sum()} at the ends left out" if inside.sum() < (~finite).sum() else "",
+    ]
+    return ", ".join(filter(None, parts)), long
 
 
 def _jumps(where: object, samples: Samples, repair: bool, otherwise: str) -> None:
@@ -227,6 +295,15 @@ def _order(where: object, samples: Samples, repair: bool, otherwise: str) -> Non
         if not repair:
             raise BagError(where, what, f"drop these samples with --repair{otherwise}")
         samples.notes.append(f"{what}: dropped")
+    share = float(np.mean(back | again))
+    if share > _LOST:
+        remedy = "give the time as a period in the mapping, or export it with more digits" if not otherwise else "record again"
+        raise BagError(where, f"{100 * share:.0f} % of the stamps go back or repeat an earlier one: too many to drop", remedy)
+    if share > _HOLD_BROKEN and samples.hold != "linear":
+        samples.notes.append(
+            f"the effort was held from stamp to stamp ({samples.hold}); with so many dropped it no longer is: linear"
+        )
+        samples.hold = "linear"
     samples.keep(~(back | again))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..importers.errors import ImportingError
 from ..record import RecordError
 
 __all__ = ["BagError", "DamagedError", "ImportingError", "WriteError"]
@@ -13,10 +14,6 @@ class BagError(RecordError):
 
 class WriteError(RecordError):
     """A bag that cannot be written where it was asked for."""
-
-
-class ImportingError(RecordError):
-    """A file or a mapping that cannot be imported."""
 
 
 class DamagedError(BagError):

@@ -13,7 +13,6 @@ A signal is ``value = column * scale + offset`` in ``unit``, and is then convert
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,13 +20,21 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from .errors import ImportingError
+from ..importers.errors import ImportingError
+from ..importers.table import closest
 
-__all__ = ["ImportMap", "PeriodMap", "SignalMap", "closest", "load_mapping"]
+__all__ = ["ImportMap", "PeriodMap", "SignalMap", "load_mapping"]
 
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class PeriodMap(_Strict):
+    """Time of samples that were taken at a constant rate and have no column for it."""
+
+    period: float = Field(gt=0)
+    unit: str
 
 
 class SignalMap(_Strict):
@@ -40,6 +47,8 @@ class SignalMap(_Strict):
         offset: added after the factor [unit].
         file: another file, relative to the folder of the main one.
         minus: a signal that is taken away from it, such as the force of a pressure from all that a load cell measures.
+        time: its own time, where it was not sampled together with the others; on the same clock as the time of the mapping,
+            or, given as a period, from the same start.
     """
 
     source: str | int = Field(alias="from")
@@ -48,13 +57,7 @@ class SignalMap(_Strict):
     offset: float = 0.0
     file: str | None = None
     minus: SignalMap | None = None
-
-
-class PeriodMap(_Strict):
-    """Time of samples that were taken at a constant rate and have no column for it."""
-
-    period: float = Field(gt=0)
-    unit: str
+    time: SignalMap | PeriodMap | None = None
 
 
 class ImportMap(_Strict):
@@ -91,12 +94,6 @@ class ImportMap(_Strict):
         return self
 
 
-def closest(name: str, among: Sequence[str]) -> str:
-    """``, the closest is 'x'`` for messages; nothing when nothing is close."""
-    match = get_close_matches(name, among, n=1, cutoff=0.6)
-    return f", the closest is '{match[0]}'" if match else ""
-
-
 def load_mapping(mapping: ImportMap | Mapping[str, Any] | str | Path) -> ImportMap:
     """A mapping from a YAML file, a dictionary, or as it is.
 
@@ -130,13 +127,24 @@ def _validated(content: Mapping[str, Any], where: object) -> ImportMap:
         findings = error.errors()
         finding = next((item for item in findings if item["type"] == "extra_forbidden"), findings[0])
         keys = [part for part in finding["loc"] if part not in {"SignalMap", "PeriodMap"}]
-        if finding["loc"][:1] == ("time",) and isinstance(content.get("time"), Mapping):
-            meant = "PeriodMap" if "period" in content["time"] else "SignalMap"
+        time = _time_of(content, finding["loc"])
+        if time is not None:
+            meant = "PeriodMap" if "period" in time else "SignalMap"
             finding = next((item for item in findings if meant in item["loc"]), finding)
             keys = [part for part in finding["loc"] if part not in {"SignalMap", "PeriodMap"}]
         line = _line(content, keys)
         at = f"line {line}: " if line else ""
         raise ImportingError(where, f"{at}{_problem(finding, keys)}", _remedy(finding, keys)) from error
+
+
+def _time_of(content: Mapping[str, Any], place: Sequence[object]) -> Mapping[str, Any] | None:
+    """The entry of a time, of the mapping or of one of its signals, that a finding is about."""
+    inner: Any = content
+    for part in place:
+        inner = inner.get(part) if isinstance(inner, Mapping) else None
+        if part == "time":
+            return inner if isinstance(inner, Mapping) else None
+    return None
 
 
 def _line(content: Any, keys: Sequence[object]) -> int | None:
@@ -155,9 +163,9 @@ def _allowed(keys: Sequence[object]) -> list[str]:
     """Keys that are allowed beside the last of ``keys``."""
     if len(keys) == 1:
         return list(ImportMap.model_fields)
-    if keys[0] == "time":
+    if "time" in keys[:-1]:
         return ["from", "unit", "scale", "offset", "file", "period"]
-    return ["from", "unit", "scale", "offset", "file"]
+    return ["from", "unit", "scale", "offset", "file", "minus", "time"]
 
 
 def _problem(finding: Any, keys: Sequence[object]) -> str:

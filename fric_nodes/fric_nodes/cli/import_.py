@@ -27,7 +27,7 @@ def register(app: typer.Typer) -> None:
 
 
 def import_(
-    file: Annotated[Path, typer.Argument(help=".mat, .csv, .txt, .npz or .parquet")],
+    file: Annotated[Path, typer.Argument(help=".mat, .csv, .txt, .json, .jsonl, .npz or .parquet")],
     mapping: Annotated[Path, typer.Option("--map", help="YAML that says where each signal comes from, its unit and a factor.")],
     out: Annotated[Path, typer.Option("--out", help="Folder of the bag to write; must not exist.")],
     storage: Annotated[Storage, typer.Option("--storage", help="Format of the bag.")] = Storage.MCAP,
@@ -37,8 +37,9 @@ def import_(
     """Turn a recording into a rosbag2 that every other verb reads.
 
     The mapping names time, effort, and position or velocity; reference, normal_load, temperature and extra signals may follow.
-    Its effort_hold says when a force acts: following (a controller's output, held from its stamp to the next), preceding, or
-    linear (measured, or nothing is known; the default).
+    Only the columns that it names are judged. A signal that was sampled at other times has a time of its own, as in effort:
+    {from: torque, unit: N m, time: {from: t2, unit: ms}}. Its effort_hold says when a force acts: following (a controller's
+    output, held from its stamp to the next), preceding, or linear (measured, or nothing is known; the default).
     """
     from ..bagio.importing import import_recording
     from ..bagio.mapping import load_mapping

@@ -21,16 +21,15 @@ from ..record import Array
 
 __all__ = ["EXCITATION"]
 
-_TABLES = (".csv", ".txt", ".tsv", ".dat", ".npz", ".parquet", ".mat")
-
 
 def _load(file: str, signal: str, joint: str) -> tuple[Array, Array]:
     """Time from 0 [s], evenly spaced, and the signal, each of shape ``(n_samples,)``."""
     # Slow to import, and only this excitation reads files.
     from ..bagio import read_record
+    from ..importers import suffixes
 
     path = Path(file).expanduser()
-    if path.suffix.lower() in _TABLES:
+    if path.suffix.lower() in suffixes():
         return _from_table(path, signal)
     record = read_record(path, joint=joint or None).uniform()
     values = record.signals().get(signal)
@@ -41,9 +40,9 @@ def _load(file: str, signal: str, joint: str) -> tuple[Array, Array]:
 
 
 def _from_table(path: Path, signal: str) -> tuple[Array, Array]:
-    from ..bagio.tables import TextOptions, load_table
+    from ..importers import TextOptions, load_table
 
-    columns = load_table(path, TextOptions()).columns
+    columns = load_table(path, TextOptions(), ("time", signal)).columns
     for name in ("time", signal):
         if name not in columns:
             raise ExcitationError(path, f"has no column '{name}'", f"name a column so; it has {', '.join(columns)}")
