@@ -53,20 +53,20 @@ def simulate(
     from .. import simulate as simulation
     from ..bagio.write import write_record
     from ..identification.equations import surroundings
+    from ..identification.initial_state import initial_state
     from ..model_file import read_model
 
     held = read_model(model)
     record = read_all([force], ReadOptions(joint, repair, time, start, end, tuple(topic or ())))[0].uniform()
     record = replace(record, nominal=held.nominal)
-    n_first = min(5, record.n_samples)
-    velocity = float(np.polyfit(record.time[:n_first], record.position[:n_first], 1)[0]) if n_first > 1 else 0.0
+    begin = initial_state(record.time, record.position)
     load, temperature = (each[:-1] if each.shape[0] > 1 else each for each in surroundings(record))
     motion = simulation.simulate(
         held,
         record.effort,
         record.sample_time,
-        position=float(record.position[0]),
-        velocity=velocity,
+        position=begin.position,
+        velocity=begin.velocity,
         hold=record.effort_hold,
         load=load,
         temperature=temperature,

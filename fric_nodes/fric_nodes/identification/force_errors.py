@@ -31,6 +31,7 @@ from ..simulate import Predictor, Simulator, intervals, substeps
 from .bootstrap import drawn_series
 from .equations import Equations, Stretch
 from .free_parameters import FreeParameters
+from .initial_state import initial_state
 from .innovations import SETTLING, Run, gains, innovations, noise_of
 
 __all__ = ["ForceErrors", "force_errors"]
@@ -172,7 +173,7 @@ def _follower(model: Model, stretch: Stretch) -> _Follower:
         step=np.full(n, h),
         effort=np.ascontiguousarray(intervals(stretch.effort, stretch.hold)),
         position=np.ascontiguousarray(stretch.raw_position[1:]),
-        start=(float(stretch.position[0]), float(stretch.velocity[0])),
+        start=initial_state(stretch.time, stretch.raw_position)[:2],
         load=load,
         temperature=temperature,
         noise=noise_of(stretch.raw_position),
