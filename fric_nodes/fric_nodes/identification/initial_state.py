@@ -20,6 +20,7 @@ per window.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -53,13 +54,13 @@ class InitialState(NamedTuple):
     @property
     def standard_errors(self) -> Array:
         """Of position [x] and velocity [x/s], shape ``(2,)``."""
-        return np.sqrt(np.diag(self.covariance))
+        return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
 
 
 def position_error(position: Array) -> float:
     """Standard deviation of the errors of ``position``, shape ``(n,)``: noise, or rounding where that is more [x]."""
     noise = noise_of(position) if position.shape[0] >= _NOISE else 0.0
-    return max(noise, resolution_of(position) / np.sqrt(12.0)) + _FLOAT * float(np.max(np.abs(position)))
+    return max(noise, resolution_of(position) / math.sqrt(12.0)) + _FLOAT * float(np.max(np.abs(position)))
 
 
 def initial_state(time: Array, position: Array, at: int = 0, error: float | None = None) -> InitialState:
