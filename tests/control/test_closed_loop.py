@@ -237,6 +237,5 @@ period: 0.001
 controller: {{type: cascade, position_gain: {float(held["kp"])!r}, velocity_gain: {gain * float(held["kv"])!r}}}
 """
     found = closed_loop(axis, read_controller(controller(text)), record.uniform())
-    print(found)
     assert found.tracking_rms == pytest.approx(found.recorded_tracking_rms, rel=0.1)
     assert found.position_rmse < 5e-4

@@ -273,7 +273,7 @@ KNOWN: dict[str, Case] = {
     "$(printf -- '--validate bags/screw_%s ' 10 30 50 70 90 120 160 200 n10 n30 n50 n70 n90 n120 n160 n200)": _long(
         needs=(_after(_SCREWS),), data=True
     ),
-    _TIAGO: Case((_published("tiago_effort.csv", "tiago_position.csv"),), data=True),
+    _TIAGO: Case((_published("tiago_effort.csv", "tiago_position.csv", "tiago_velocity.csv"),), data=True),
     "fric diagnose bags/torso --blocks 6 --repair --model config/published/torso_nominal.yaml --out diagnosis": _long(
         needs=(_after(_TIAGO),), data=True
     ),

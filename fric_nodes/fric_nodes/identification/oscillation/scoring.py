@@ -15,7 +15,6 @@ from ...model import Model
 from ...record import Array, Record
 from ...simulate import simulate
 from ..equations import equations
-from ..initial_state import initial_state
 from ..result import Options, Score
 from ..scoring import force_along
 from .recording import Oscillation
@@ -42,7 +41,11 @@ def _free_part(record: Record, found: Oscillation, gains: tuple[float, float] | 
 
 def _free_run(model: Model, part: Record, found: Oscillation) -> Array:
     """Simulated less recorded position [x], shape ``(n,)``, from the middle of the first half cycle on."""
-    position, velocity, _ = initial_state(found.time, found.position, _middle(found))
+    near = max(int(0.15 * found.half_period / found.sample_time), 3)
+    at = _middle(found)
+    around = slice(at - near, at + near + 1)
+    # Between reversals the motion is smooth: a polynomial says where it is and how fast.
+    *_, velocity, position = np.polyfit(found.time[around] - found.time[at], found.position[around], 3).tolist()
     motion = simulate(model, part.effort, part.sample_time, position=position, velocity=velocity, hold=part.effort_hold)
     return motion.position - part.position
 
