@@ -237,5 +237,7 @@ period: 0.001
 controller: {{type: cascade, position_gain: {float(held["kp"])!r}, velocity_gain: {gain * float(held["kv"])!r}}}
 """
     found = closed_loop(axis, read_controller(controller(text)), record.uniform())
-    assert found.tracking_rms == pytest.approx(found.recorded_tracking_rms, rel=0.1)
-    assert found.position_rmse < 5e-4
+    assert found.tracking_rms == pytest.approx(found.recorded_tracking_rms, rel=0.01)
+    assert found.position_rmse < 1e-5
+    # The equations of a fit leave 4.1 %.
+    assert found.relative_force_error_percent < 6.0
