@@ -113,6 +113,15 @@ def _simulated(folder: Path) -> None:
     write_record(replace(record, effort=0.98 * record.effort), folder / "bags" / "simulated")
 
 
+def _followed(folder: Path) -> None:
+    """``bags/my_run``: a recording with its reference."""
+    from fric_nodes.bagio.read import read_record
+    from fric_nodes.bagio.write import write_record
+
+    record = read_record(folder / "bags" / "contour", end=4.0)
+    write_record(replace(record, reference=record.position), folder / "bags" / "my_run")
+
+
 def _published(*names: str, under: str = "") -> Setup:
     """Files of published recordings, from the folder FRIC_DATA; ``under``: part of the path to them."""
 
@@ -210,6 +219,9 @@ KNOWN: dict[str, Case] = {
     "fric compare bags/simulated bags/slide --out comparison": Case((_simulated,)),
     "fric model show found/model.yaml": Case((_found,)),
     "fric simulate found/model.yaml --force bags/slide --out bags/simulated": Case((_found,)),
+    "fric simulate found/model.yaml --closed-loop config/controller.yaml --reference bags/my_run --out bags/closed": Case(
+        (_found, _followed)
+    ),
     "ros2 run fric_nodes recorder --ros-args -p bag:=bags/my_run": Case(node="recorder"),
     "ros2 run fric_nodes player --ros-args -p bag:=bags/slide -p rate:=4.0": Case(node="player"),
     "ros2 run fric_nodes compensator --ros-args --params-file config/compensator.yaml -p model_file:=found/model.yaml": Case(
