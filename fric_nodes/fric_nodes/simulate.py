@@ -100,6 +100,11 @@ class Simulator:
         """As the sensor sees it [x/s]."""
         return float(self.states[self._encoder[1]])
 
+    def memory_of(self, number: int) -> Array:
+        """The part of :attr:`memory` that belongs to term ``number``, a view; its effect says what stands in it."""
+        first = sum(held.effect.n_memory for held in self._model.terms[:number])
+        return self.memory[first : first + self._model.terms[number].effect.n_memory]
+
     def run(
         self,
         effort: Array,

@@ -16,18 +16,14 @@ from fric_nodes.verification.verification import Evidence, Verification
 
 _LONG = {
     "amthor",
-    "asperity-dynamics",
     "asperity-dwell",
-    "asperity-velocity",
     "calibration",
-    "dnlrx",
     "free-oscillation",
     "online",
     "passivity",
     "static-maps",
     "steady-curves",
     "stick-slip",
-    "transmission",
 }
 
 

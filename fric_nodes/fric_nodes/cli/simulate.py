@@ -1,14 +1,15 @@
-"""``fric simulate``: the motion of a model under the forces of a recording, as a bag."""
+"""``fric simulate``: the motion of a model under the forces of a recording, or in closed loop under its reference, as a bag."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from ..errors import InputError
 from .options import (
     EndOption,
     JointOption,
@@ -20,6 +21,10 @@ from .options import (
     TopicOption,
     read_all,
 )
+
+if TYPE_CHECKING:
+    from ..model import Model
+    from ..record import Record
 
 __all__ = ["register"]
 
@@ -35,10 +40,17 @@ def register(app: typer.Typer) -> None:
 
 def simulate(
     model: Annotated[Path, typer.Argument(help="A fric-model/1 file.")],
-    force: Annotated[
-        Path, typer.Option("--force", help="Recording whose force leads the model, and whose motion it is compared with.")
-    ],
     out: Annotated[Path, typer.Option("--out", help="Folder of the bag to write; must not exist.")],
+    force: Annotated[
+        Path | None, typer.Option("--force", help="Free run: the recording whose force leads the model.", show_default=False)
+    ] = None,
+    closed_loop: Annotated[
+        Path | None,
+        typer.Option("--closed-loop", help="Closed loop: a fric-controller/1 file (see control/controller_file.py)."),
+    ] = None,
+    reference: Annotated[
+        Path | None, typer.Option("--reference", help="Closed loop: the recording whose reference is followed.")
+    ] = None,
     joint: JointOption = None,
     repair: RepairOption = False,
     time: TimeOption = "stamp",
@@ -47,26 +59,57 @@ def simulate(
     topic: TopicOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate a model in a free run under the recorded force; the recorded position becomes the reference of the new bag."""
+    """Simulate a model in a free run under a recorded force, or in closed loop under a recorded reference.
+
+    It starts in the recorded state and is compared with the recorded motion. In a free run the recorded position becomes the
+    reference of the new bag.
+    """
+    from ..model_file import read_model
+
+    if (force is None) == (closed_loop is None) or (closed_loop is None) != (reference is None):
+        raise InputError(
+            "fric simulate",
+            "no single way to lead the model",
+            "give --force BAG, or --closed-loop CONTROLLER.yaml --reference BAG",
+        )
+    held = read_model(model)
+    options = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
+    if closed_loop is not None and reference is not None:
+        shown = _in_closed_loop(held, model, closed_loop, _recorded(reference, options, held), out)
+    else:
+        assert force is not None
+        shown = _free_run(held, model, force, _recorded(force, options, held), out)
+    typer.echo(json.dumps(shown.as_json) if as_json else shown.text)
+
+
+class _Shown(NamedTuple):
+    """What is printed."""
+
+    as_json: dict[str, object]
+    text: str
+
+
+def _recorded(path: Path, options: ReadOptions, model: Model) -> Record:
+    """The recording, evenly sampled, with the conditions at which the model's values hold."""
+    return replace(read_all([path], options)[0].uniform(), nominal=model.nominal)
+
+
+def _free_run(held: Model, model: Path, force: Path, record: Record, out: Path) -> _Shown:
     import numpy as np
 
     from .. import simulate as simulation
     from ..bagio.write import write_record
     from ..identification.equations import surroundings
-    from ..model_file import read_model
+    from ..signals.initial_state import initial_state
 
-    held = read_model(model)
-    record = read_all([force], ReadOptions(joint, repair, time, start, end, tuple(topic or ())))[0].uniform()
-    record = replace(record, nominal=held.nominal)
-    n_first = min(5, record.n_samples)
-    velocity = float(np.polyfit(record.time[:n_first], record.position[:n_first], 1)[0]) if n_first > 1 else 0.0
+    begin = initial_state(record.time, record.position)
     load, temperature = (each[:-1] if each.shape[0] > 1 else each for each in surroundings(record))
     motion = simulation.simulate(
         held,
         record.effort,
         record.sample_time,
-        position=float(record.position[0]),
-        velocity=velocity,
+        position=begin.position,
+        velocity=begin.velocity,
         hold=record.hold,
         load=load,
         temperature=temperature,
@@ -81,8 +124,40 @@ def simulate(
         notes=(f"simulated from {model} under the force of {force}",),
     )
     write_record(simulated, out)
-    if as_json:
-        typer.echo(json.dumps({"bag": str(out), "samples": record.n_samples, "position_rmse": error}))
-    else:
-        unit = record.units.position
-        typer.echo(f"{out}: {record.n_samples} samples; position RMSE against the recording {error:.3g} {unit}")
+    unsure = float(begin.standard_errors[1])
+    unit = record.units.position
+    return _Shown(
+        {
+            "bag": str(out),
+            "samples": record.n_samples,
+            "position_rmse": error,
+            "start_velocity": {"value": begin.velocity, "std": unsure, "unit": f"{unit}/s"},
+        },
+        f"{out}: {record.n_samples} samples from {begin.velocity:.3g} ± {unsure:.2g} {unit}/s on;"
+        f" position RMSE against the recording {error:.3g} {unit}",
+    )
+
+
+def _in_closed_loop(held: Model, model: Path, controller: Path, record: Record, out: Path) -> _Shown:
+    from ..bagio.write import write_record
+    from ..control.closed_loop import closed_loop
+    from ..control.controller_file import read_controller
+
+    found = closed_loop(held, read_controller(controller), record)
+    note = f"simulated from {model} in closed loop with {controller} under the reference of {record.source}"
+    write_record(replace(found.record, notes=(note,)), out)
+    unit = record.units.position
+    return _Shown(
+        {
+            "bag": str(out),
+            "samples": record.n_samples,
+            "position_rmse": found.position_rmse,
+            "relative_force_error_percent": found.relative_force_error_percent,
+            "tracking_rms": found.tracking_rms,
+            "recorded_tracking_rms": found.recorded_tracking_rms,
+            "saturated": found.saturated,
+        },
+        f"{out}: {record.n_samples} samples in closed loop; against the recording: position RMSE {found.position_rmse:.3g}"
+        f" {unit}, force error {found.relative_force_error_percent:.3g} %\n"
+        f"tracking error (RMS) {found.tracking_rms:.3g} {unit}, as recorded {found.recorded_tracking_rms:.3g} {unit}",
+    )

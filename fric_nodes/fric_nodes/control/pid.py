@@ -88,6 +88,21 @@ class Pid:
         self._derivative = 0.0
         self._before: tuple[float, float] | None = None
 
+    def begin(self, reference: tuple[float, float], state: tuple[float, float], force: float, duration: float) -> None:
+        """Start in motion, as if it had been controlling before.
+
+        Args:
+            reference: position [x] and velocity [x/s] wanted at the first sample.
+            state: position [x] and velocity [x/s] then.
+            force: output at the first sample [F]; what the gains don't give stands in the integral, where there is one.
+            duration: time between samples [s].
+        """
+        gains = self.gains
+        self._derivative = gains.derivative * (gains.velocity_weight * reference[1] - state[1])
+        self._before = reference[0] - duration * reference[1], state[0] - duration * state[1]
+        proportional = gains.proportional * (gains.position_weight * reference[0] - state[0])
+        self._integral = force - proportional - self._derivative if gains.integral > 0.0 else 0.0
+
     def set_gains(self, gains: PidGains) -> None:
         """Go on with other gains, without a jump of the output."""
         if self._before is not None:

@@ -26,8 +26,9 @@ from ..parameter import Parameter
 
 __all__ = ["EFFECT"]
 
-# The memory: how far the appendage is ahead of the body [x], and its velocity [x/s]; then what the waves of the last step were
-# for (the step [s], the mode's frequency [rad/s], its damping ratio) and these waves, which cost more than the rest of a step.
+# The memory begins with how far the appendage is ahead of the body [x], and its velocity [x/s]. Then comes what the waves of
+# the last step were for (the step [s], the mode's frequency [rad/s], its damping ratio) and these waves, which cost more than
+# the rest of a step.
 
 
 @kernel

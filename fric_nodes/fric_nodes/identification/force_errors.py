@@ -27,6 +27,7 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array, Index, Mask
+from ..signals.initial_state import initial_state
 from ..signals.resolution import noise_of
 from ..simulate import Predictor, Simulator, intervals, substeps
 from .bootstrap import drawn_series
@@ -173,7 +174,7 @@ def _follower(model: Model, stretch: Stretch) -> _Follower:
         step=np.full(n, h),
         effort=np.ascontiguousarray(intervals(stretch.effort, stretch.hold)),
         position=np.ascontiguousarray(stretch.raw_position[1:]),
-        start=(float(stretch.position[0]), float(stretch.velocity[0])),
+        start=initial_state(stretch.time, stretch.raw_position)[:2],
         load=load,
         temperature=temperature,
         noise=noise_of(stretch.raw_position),

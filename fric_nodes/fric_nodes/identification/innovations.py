@@ -20,6 +20,7 @@ from scipy.special import comb
 
 from ..model import Model
 from ..record import Array, Record
+from ..signals.initial_state import initial_state
 from ..signals.resolution import noise_of
 from ..simulate import intervals
 from .equations import surroundings
@@ -76,8 +77,8 @@ class Run:
         position = self.position[first:last]
         begin = self.start
         if first > 0:
-            before = float(self.position[first - 1])
-            begin = (before, float((position[0] - before) / self.step[first]))
+            time = np.concatenate([[0.0], np.cumsum(self.step)])[1:]
+            begin = initial_state(time, self.position, first - 1)[:2]
         load = self.load[first:last] if self.load.shape[0] > 1 else self.load
         temperature = self.temperature[first:last] if self.temperature.shape[0] > 1 else self.temperature
         return replace(
@@ -121,7 +122,7 @@ def runs_of(record: Record, late: float | None = None) -> list[Run]:
                 step=step,
                 effort=np.ascontiguousarray(_over_intervals(record.effort[first:last], step, record.hold, late)),
                 position=np.ascontiguousarray(position[1:]),
-                start=(float(position[0]), float((position[1] - position[0]) / step[0])),
+                start=initial_state(record.time[first:last], position)[:2],
                 load=load[first : last - 1] if load.shape[0] > 1 else load,
                 temperature=temperature[first : last - 1] if temperature.shape[0] > 1 else temperature,
                 noise=noise_of(position),

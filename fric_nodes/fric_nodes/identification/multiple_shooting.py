@@ -1,15 +1,16 @@
 """Free runs over a recording, one or many, and what is done about the state in which each of them starts.
 
-A run takes its start from the filtered recording; yet the filter smears what happens within its width (a reversal, a stop), and
-has noise of its own. So each start has a position and a velocity of its own to be found beside the parameters theta,
+A run takes its start from the recording (:mod:`fric_nodes.signals.initial_state`), which leaves it uncertain by the
+noise of the position, and by motion too quick to average over. So each start has a position and a velocity of its own to be
+found beside the parameters theta,
 
     min  sum |r_i(theta, s_i)|^2 + sum_c w_c^2 ((s_ic - s_ic') / sigma_ic)^2  (+ kappa^2 sum of squared jumps between runs),
 
-tied to the filtered state s' by its error sigma (multiple shooting, Bock 1983; the tie is a Gaussian prior), or free. w_c makes
-both sums comparable: w_c^2 = sum (J_c' d)^2 / sum |J_c|^2, with J_c the change of the errors with start component c and d what
-force errors and noise change in them, is the mean square of the errors if they are white, and more if they are correlated.
-Free starts give the better estimates even where the filtered state is good: they take out of each run what a force error before
-and early in it has done, the largest and most correlated part of its errors.
+tied to the measured state s' by its standard error sigma (multiple shooting, Bock 1983; the tie is a Gaussian prior), or free.
+w_c makes both sums comparable: w_c^2 = sum (J_c' d)^2 / sum |J_c|^2, with J_c the change of the errors with start component c
+and d what force errors and noise change in them, is the mean square of the errors if they are white, and more if they are
+correlated. Free starts give the better estimates even where the measured state is good: they take out of each run what a force
+error before and early in it has done, the largest and most correlated part of its errors.
 
 The path is not required to be continuous from run to run. A force error bends it away from the measured one, twice integrated,
 and a continuous path would carry that through the whole recording, just as one long run does. It can be asked for (kappa),
@@ -31,6 +32,8 @@ from scipy.sparse.linalg import splu
 
 from ..model import Model
 from ..record import Array, Index
+from ..signals.initial_state import initial_state
+from ..signals.instrument_noise import level_of
 from ..signals.resolution import noise_of
 from ..simulate import Predictor, Simulator, intervals, substeps
 from .equations import Equations, Stretch
@@ -38,12 +41,14 @@ from .force_errors import ForceErrors
 
 __all__ = ["Run", "Shooting", "runs_over", "shooting"]
 
-# Times the filter's error: as good as no tie, but the velocity of a run that stays at rest is not left undetermined.
+# Times the standard error: as good as no tie, but the velocity of a run that stays at rest is not left undetermined.
 _FREE = np.array([1e6, 1e3])
 _ESCAPED = 1e6
 _GROWTH = 8  # of the number of steps, at most
 _WEIGHING_DRAWS = 8
 _SETTLING_STEPS = 3
+_RESOLVED = 1e-9  # of the travel
+_MATTERS = 0.03  # of the errors: a tenth of the parameters' variance at most, where these are a hundred independent numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +106,8 @@ class Shooting:
         n_substeps: steps per sample of each run: the same for every trial, since a change of it would look like a slope.
         most_substeps: of each run, up to which that number may grow: a search may stray to where a step would take for ever.
         start: position and velocity of each run, shape ``(n_runs, 2)``.
-        measured: the same, filtered.
-        spread: standard deviation of its error, shape ``(n_runs, 2)``.
+        measured: the same, as measured.
+        spread: its standard error, shape ``(n_runs, 2)``.
         tied: False when starts are taken as measured.
         free: True when nothing ties them to what was measured.
         continuity: weight of jumps between runs.
@@ -225,7 +230,7 @@ class Shooting:
         while True:
             forces = {s: disturbance.drawn(s.time.shape[0] - 1, s.sample_time, random) for s in stretches}
             push = [forces[run.stretch][run.first : run.last - 1] for run in self.runs]
-            # A filtered start is wrong by its spread, in a draw as in the recording: it shows in the tie, or in the run.
+            # A measured start is wrong by its spread, in a draw as in the recording: it shows in the tie, or in the run.
             offset = self.spread * random.standard_normal(self.start.shape)
             errors, ends = self.errors(model, push, self.start if self.tied else self.start + offset)
             moved = errors - undisturbed + level * random.standard_normal(level.shape[0])
@@ -260,6 +265,16 @@ class Shooting:
         wanted = [substeps(model, run.stretch.sample_time) for run in self.runs]
         known = zip(wanted, self.n_substeps, self.most_substeps, strict=True)
         return replace(self, n_substeps=[max(now, min(asked, most)) for asked, now, most in known])
+
+    def start_matters(self, model: Model) -> bool:
+        """True when the uncertainty of the starts changes the errors of ``model`` by more than can be neglected."""
+        base, _ = self.errors(model)
+        changed = 0.0
+        for c in range(2):
+            moved = self.start.copy()
+            moved[:, c] += self.spread[:, c]
+            changed += float(np.sum((self.errors(model, start=moved)[0] - base) ** 2))
+        return changed > _MATTERS**2 * float(base @ base)
 
     def settled(self, model: Model) -> Shooting:
         """The same with the starts that suit ``model``."""
@@ -346,25 +361,21 @@ def shooting(model: Model, found: Equations, horizon: float | None, starts: str,
         model: whose rates say how many steps a sample takes.
         found: the recordings.
         horizon: length of the runs [s]; None: whole recordings.
-        starts: ``tied`` to the filtered state, ``free``, or as ``measured``.
+        starts: ``tied`` to the measured state, ``free``, or as ``measured``.
         continuity: weight of jumps between runs.
     """
     runs = runs_over(found.stretches, horizon)
-    measured = np.array([(run.stretch.position[run.first], run.stretch.velocity[run.first]) for run in runs])
-    spread = np.array([_filter_error(run, found.cutoff) for run in runs])
+    measured, spread = _starts(runs, found.cutoff)
     n_substeps = [substeps(model, run.stretch.sample_time) for run in runs]
     most = [_GROWTH * number for number in n_substeps]
     return Shooting(runs, n_substeps, most, measured, measured, spread, starts != "measured", starts == "free", continuity)
 
 
-def _filter_error(run: Run, cutoff: float) -> tuple[float, float]:
-    """Standard deviation of position [x] and velocity [x/s] after the filter, at the start of a run.
-
-    From what the filter took away around there: noise, and motion too quick for it.
-    """
-    s = run.stretch
-    reach = max(int(np.ceil(0.5 / (cutoff * s.sample_time))), 3)
-    around = slice(max(run.first - reach, 0), run.first + reach + 1)
-    off = float(np.sqrt(np.mean((s.raw_position - s.position)[around] ** 2)))
-    off = max(off, 1e-9 * float(np.ptp(s.position)), np.finfo(np.float64).tiny)
-    return off, 2.0 * np.pi * cutoff * off
+def _starts(runs: Sequence[Run], cutoff: float) -> tuple[Array, Array]:
+    """Position [x] and velocity [x/s] at the start of each run, and their standard errors, shape ``(n_runs, 2)`` each."""
+    errors = {stretch: level_of(stretch.raw_position) for stretch in dict.fromkeys(run.stretch for run in runs)}
+    found = [initial_state(run.stretch.time, run.stretch.raw_position, run.first, errors[run.stretch]) for run in runs]
+    # What a difference of two runs can still be told from.
+    least = np.array([_RESOLVED * float(np.ptp(run.stretch.raw_position)) for run in runs])[:, None]
+    spread = np.maximum([state.standard_errors for state in found], least * np.array([1.0, 2.0 * np.pi * cutoff]))
+    return np.array([(state.position, state.velocity) for state in found]), np.maximum(spread, np.finfo(np.float64).tiny)

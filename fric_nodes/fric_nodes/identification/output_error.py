@@ -4,7 +4,8 @@ Minimises sum (q - q_hat)^2 over free runs of the compiled simulation, from the 
 Gauss-Newton steps. With the whole recording as one run this is the published test of an axis model. On an axis whose position
 drifts away under small force errors, or that runs away without its controller, shorter runs (``horizon``) keep errors from
 building up through the integrator; where they start is found with the parameters
-(:mod:`fric_nodes.identification.multiple_shooting`). Several starts (``starts``) search for a better minimum than the nearest.
+(:mod:`fric_nodes.identification.multiple_shooting`), and so it is of a whole recording where the uncertainty of its first
+state matters. Several starts (``starts``) search for a better minimum than the nearest.
 Source: Ljung 1999, chapter 7 (output error).
 
 Standard errors: in a free run an error of the force adds up for as long as friction lets it, so that the residuals of a whole
@@ -200,6 +201,10 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
         return _minimised(model, free, runs.refined(model))
 
     best, ends = best_of(briefly, to_the_end, starts, free)
+    if not options.start_states and not best.runs.tied and best.runs.start_matters(best.model):
+        options = replace(options, start_states="tied")
+        tied = replace(best.runs, tied=True).weighed(best.model, force_errors(best.model, free, found))
+        best = _minimised(best.model, free, tied)
     trouble = _escape(best, options)
     if not trouble and not best.answer.converged:
         remedy = "start nearer to the machine's values (--model), or shorten the runs (--horizon)"

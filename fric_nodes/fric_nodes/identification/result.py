@@ -38,8 +38,8 @@ class Options:
         gains: P [F/x] and D [F s/x] of the feedback under which each recording was made, for oscillations; empty: not given.
         bounds: limits of parameters, ``(name, lower, upper)``, inside those that they are declared with.
         starts: number of starts of a search; the best end of all is taken.
-        start_states: where the runs of an output-error fit start: ``measured``, as filtered; ``tied`` to that by its error;
-            ``free``. Empty: measured for a whole recording, free for shorter runs.
+        start_states: where the runs of an output-error fit start: as ``measured``; ``tied`` to that by its standard error;
+            ``free``. Empty: for a whole recording tied where that error matters, else as measured; free for shorter runs.
         continuity: weight of the jumps from the end of one of these runs to the start of the next; 0: they may jump.
     """
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array, Record
+from ..signals.initial_state import initial_state
 from ..simulate import Predictor, intervals, respond, simulate
 from .equations import FINER, Equations, Motion, Stretch, equations
 from .result import Options, Score
@@ -84,12 +85,13 @@ def _along(model: Model, motion: Motion) -> Array:
 
 def free_run(model: Model, stretch: Stretch) -> Array:
     """Position of ``model`` [x], shape ``(n,)``, led by the measured force alone from the stretch's first state."""
+    begin = initial_state(stretch.time, stretch.raw_position)
     motion = simulate(
         model,
         stretch.effort,
         stretch.sample_time,
-        position=float(stretch.position[0]),
-        velocity=float(stretch.velocity[0]),
+        position=begin.position,
+        velocity=begin.velocity,
         hold=stretch.hold,
         load=stretch.load[:-1] if stretch.load.shape[0] > 1 else stretch.load,
         temperature=stretch.temperature[:-1] if stretch.temperature.shape[0] > 1 else stretch.temperature,

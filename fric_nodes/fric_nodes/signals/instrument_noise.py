@@ -16,12 +16,15 @@ from .resolution import noise_of, step_of
 
 __all__ = ["errors_like", "level_of"]
 
+_FEWEST = 12  # samples
 _FLOAT = 1e-13  # of the largest position: what double precision and filters leave
 
 
 def level_of(position: Array) -> float:
     """Standard deviation of the errors of ``position``, shape ``(n,)`` [x]."""
-    return max(noise_of(position), step_of(position) / math.sqrt(12.0)) + _FLOAT * float(np.max(np.abs(position)))
+    # Of fewer differences the median is no measure.
+    noise = noise_of(position) if position.shape[0] >= _FEWEST else 0.0
+    return max(noise, step_of(position) / math.sqrt(12.0)) + _FLOAT * float(np.max(np.abs(position)))
 
 
 def errors_like(position: Array, smooth: Array, random: np.random.Generator) -> Array:

@@ -56,9 +56,9 @@ def _decimation(train: Prepared) -> list[Figure]:
     for every in (DECIMATION, 1):
         cost = Cost(train.parts, _COMPARED, rows_of(train.parts, _COMPARED, every))
         cost(np.linspace(train.lowest, train.highest, _COMPARED[0]))
-        start = time.perf_counter()
+        start = time.process_time()
         found[every] = search(cost, train.lowest, train.highest)
-        spent[every] = (time.perf_counter() - start) / found[every].evaluations
+        spent[every] = (time.process_time() - start) / found[every].evaluations
         noe[every] = train.noe(solve(train, found[every].thresholds, _COMPARED, rows_of(train.parts, _COMPARED)).model)
     return [
         Figure(

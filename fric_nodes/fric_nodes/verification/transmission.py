@@ -147,7 +147,8 @@ def _free_modes(body: float) -> list[Figure]:
         simulator.run(part, _STEP, 1)
         v = float(simulator.states[1])
         momentum, energy = body * v, 0.5 * body * v**2
-        for (m, f, _), r, speed in zip(_MODES, simulator.memory[::2], simulator.memory[1::2], strict=True):
+        for number, (m, f, _) in enumerate(_MODES):
+            r, speed = simulator.memory_of(number)[:2]
             momentum += m * float(speed)
             energy += 0.5 * m * float(speed) ** 2 + 0.5 * m * (2.0 * math.pi * f * float(r)) ** 2
         misses.append(momentum / float(impulse[100 * k + 99]) - 1.0)

@@ -1,0 +1,98 @@
+"""Cascade of position and velocity control (P-PI), as most servo drives have it.
+
+Equation, at sample k with the reference r and its velocity w, the measured position y and the feedforward force f:
+
+    v_k = (T_f v_(k-1) + y_k - y_(k-1)) / (T_f + h)               measured velocity
+    e_k = k_p (r_k - y_k) + c w_k - v_k                           error of the velocity
+    I_k = I_(k-1) + k_i h e_k
+    u_k = clip(k_v e_k + I_k + f_k)
+
+While the output is limited, the integral stays where it would drive it further beyond the limit. Without k_i and with c = 0 it
+is the controller of the EMPS benchmark (Janot, Gautier, Brunot 2019), k_v (k_p (r - y) - v).
+Source: Leonhard 2001, Control of Electrical Drives, chapter 15.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+__all__ = ["Cascade", "CascadeGains"]
+
+
+@dataclass(frozen=True)
+class CascadeGains:
+    """Gains of a cascade.
+
+    Attributes:
+        position_gain: k_p [1/s].
+        velocity_gain: k_v [F s/x].
+        velocity_integral: k_i [F/x].
+        velocity_weight: weight c of the reference's velocity [1].
+        filter_time: time constant T_f of the velocity's filter [s].
+    """
+
+    position_gain: float
+    velocity_gain: float
+    velocity_integral: float = 0.0
+    velocity_weight: float = 0.0
+    filter_time: float = 0.0
+
+
+class Cascade:
+    """A cascade with its state.
+
+    Args:
+        gains: of both loops.
+        limit: largest output [F].
+
+    Attributes:
+        saturated: number of samples at which the limit took something away.
+    """
+
+    def __init__(self, gains: CascadeGains, limit: float = math.inf) -> None:
+        self.gains = gains
+        self.limit = limit
+        self.saturated = 0
+        self._integral = 0.0
+        self._velocity = 0.0
+        self._before: float | None = None
+
+    def begin(self, reference: tuple[float, float], state: tuple[float, float], force: float, duration: float) -> None:
+        """Start in motion, as if it had been controlling before.
+
+        Args:
+            reference: position [x] and velocity [x/s] wanted at the first sample.
+            state: position [x] and velocity [x/s] then.
+            force: output at the first sample [F]; what the gains don't give stands in the integral, where there is one.
+            duration: time between samples [s].
+        """
+        self._velocity = state[1]
+        self._before = state[0] - duration * state[1]
+        gains = self.gains
+        error = gains.position_gain * (reference[0] - state[0]) + gains.velocity_weight * reference[1] - state[1]
+        self._integral = force - gains.velocity_gain * error if gains.velocity_integral > 0.0 else 0.0
+
+    def step(self, reference: float, velocity: float, measured: float, duration: float, feedforward: float = 0.0) -> float:
+        """Output [F] for one sample that comes ``duration`` [s] after the last.
+
+        Args:
+            reference: position wanted [x].
+            velocity: velocity wanted [x/s].
+            measured: position [x].
+            duration: time since the last sample [s].
+            feedforward: force added inside the limit [F].
+        """
+        gains = self.gains
+        before = measured if self._before is None else self._before
+        self._velocity = (gains.filter_time * self._velocity + measured - before) / (gains.filter_time + duration)
+        self._before = measured
+        error = gains.position_gain * (reference - measured) + gains.velocity_weight * velocity - self._velocity
+        integral = self._integral + gains.velocity_integral * duration * error
+        wanted = gains.velocity_gain * error + integral + feedforward
+        output = min(max(wanted, -self.limit), self.limit)
+        if output != wanted:
+            self.saturated += 1
+        if (wanted - output) * error <= 0.0:
+            self._integral = integral
+        return output

@@ -1,0 +1,395 @@
+"""Every command that README.md and docs/ print is run as it is printed.
+
+A printed command is a line of a ``sh`` block, or inline code that begins with ``fric`` and an argument, ``ros2`` or ``colcon``.
+Each must be known here, with what it needs in the folder that it runs in; one that isn't known fails, so that a new line of the
+README comes with its case. Inline code that names a verb or an option without what it works on (``fric diagnose``,
+``fric identify --gain``) must name one that there is. Nodes run until they are in the graph and some seconds more, and end with
+status 0 on SIGINT.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from .conftest import Graph
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+_RUNNING = 2.0  # [s] that a node goes on once it is in the graph
+_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.M | re.S)
+_PLANT = "fric node plant --ros-args"
+
+Setup = Callable[[Path], None]
+
+
+def _lines(block: str) -> list[str]:
+    joined = re.sub(r"\\\n\s*", "", block)
+    # A comment: what follows # and a space behind at least two spaces, or at the beginning of a line.
+    found = (re.sub(r"(^|\s\s+)#\s.*$", "", line).strip() for line in joined.splitlines())
+    return [line for line in found if line]
+
+
+def _inline(text: str) -> list[str]:
+    spans = re.findall(r"`([^`\n]+)`", _BLOCK.sub("", text))
+    # In the table of plants "…" stands for the beginning of the command in its first row.
+    spans = [re.sub(r"^… (?=-p )", f"{_PLANT} ", span) for span in spans]
+    spans = [re.sub(r"^… (?=config/)", f"{_PLANT} --params-file ", span) for span in spans]
+    spans = [re.sub(r"^(?=\w+_plant\.yaml$)", f"{_PLANT} --params-file config/", span) for span in spans]
+    return [span for span in spans if re.match(r"(fric|ros2|colcon) ", span)]
+
+
+def _printed() -> list[str]:
+    found: dict[str, None] = {}
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for language, block in _BLOCK.findall(text):
+            found |= dict.fromkeys(_lines(block) if language == "sh" else ())
+        found |= dict.fromkeys(_inline(text))
+    return list(found)
+
+
+_ON_FILES = {"diagnose", "import", "identify", "compare", "simulate"}  # verbs that name first what they work on
+
+
+def _is_name(command: str) -> bool:
+    """True when it names a verb, or options of one, without what it works on; or holds a placeholder."""
+    words = command.split()
+    if words[-1] in {"…", "NAME", "--help"} or command in {"fric verify", "fric prove"}:
+        return True
+    return words[0] == "fric" and words[1] in _ON_FILES and (len(words) == 2 or words[2].startswith("--"))
+
+
+# What commands need
+
+
+def _map(folder: Path) -> None:
+    """``run.csv`` of an axis with friction in the columns of the README's mapping, and that mapping as ``map.yaml``."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    mapping = next(block for language, block in _BLOCK.findall(text) if language == "yaml" and "# map.yaml" in block)
+    (folder / "map.yaml").write_text(mapping, encoding="utf-8")
+    gain = float(re.findall(r"scale: ([-+.\deE]+)", mapping)[0])
+    h, n = 1e-3, 12_000
+    t = h * np.arange(n)
+    reference = 0.05 * np.sin(2.0 * np.pi * 0.7 * t) + 0.02 * np.sin(2.0 * np.pi * 2.3 * t)
+    q = v = 0.0
+    rows = []
+    for k in range(n):
+        u = 2e4 * (reference[k] - q) - 300.0 * v
+        rows.append((t[k], 1e-6 * round(q / 1e-6), u / gain))
+        for _ in range(10):
+            free = v + 1e-4 / 5.0 * (u - 30.0 * v)
+            v = np.copysign(max(abs(free) - 1e-4 / 5.0 * 12.0, 0.0), free)
+            q += 1e-4 * v
+    lines = ["t,qm,vir", *(f"{a:.3f},{b:.6f},{c:.9g}" for a, b, c in rows)]
+    (folder / "run.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _found(folder: Path) -> None:
+    """What ``fric identify --out found`` leaves, with and without ``--design``: a model and an excitation."""
+    (folder / "found").mkdir()
+    shutil.copy(ROOT / "config" / "nominal_model.yaml", folder / "found" / "model.yaml")
+    shutil.copy(ROOT / "config" / "excitation.yaml", folder / "found" / "excitation.yaml")
+
+
+def _simulated(folder: Path) -> None:
+    """``bags/simulated``: the recording with a little less force."""
+    from fric_nodes.bagio.read import read_record
+    from fric_nodes.bagio.write import write_record
+
+    record = read_record(folder / "bags" / "slide")
+    write_record(replace(record, effort=0.98 * record.effort), folder / "bags" / "simulated")
+
+
+def _followed(folder: Path) -> None:
+    """``bags/my_run``: a recording with its reference."""
+    from fric_nodes.bagio.read import read_record
+    from fric_nodes.bagio.write import write_record
+
+    record = read_record(folder / "bags" / "contour", end=4.0)
+    write_record(replace(record, reference=record.position), folder / "bags" / "my_run")
+
+
+def _published(*names: str, under: str = "") -> Setup:
+    """Files of published recordings, from the folder FRIC_DATA; ``under``: part of the path to them."""
+
+    def link(folder: Path) -> None:
+        for name in names:
+            held = [path for path in sorted(Path(os.environ["FRIC_DATA"]).rglob(name)) if under in str(path)]
+            assert held, f"{name} is not in FRIC_DATA"
+            shutil.copy(held[0], folder / name)
+
+    return link
+
+
+def _after(*commands: str) -> Setup:
+    """What these commands leave."""
+
+    def run(folder: Path) -> None:
+        for command in commands:
+            for prepare in KNOWN[command].needs:
+                prepare(folder)
+            status = os.waitstatus_to_exitcode(os.system(f"cd {folder} && {{ {command} ; }} >/dev/null 2>&1"))
+            assert status == 0, command
+
+    return run
+
+
+@dataclass(frozen=True)
+class Case:
+    """How a printed command is run.
+
+    Attributes:
+        needs: what makes the files that it reads.
+        node: name of the node that it starts; it is stopped.
+        long: it takes more than some seconds.
+        data: it reads published recordings.
+        status: with which it may end; 1 says that what was asked for was found, or a goal was missed.
+        tool: that has to be there.
+        checked: for what can't run within a test: true when it is checked elsewhere.
+        limit: time that it may take [s].
+    """
+
+    needs: tuple[Setup, ...] = ()
+    node: str = ""
+    long: bool = False
+    data: bool = False
+    status: tuple[int, ...] = (0,)
+    tool: str = ""
+    checked: Callable[[], bool] | None = None
+    limit: float = 300.0
+
+
+def _in_ci(*texts: str) -> Callable[[], bool]:
+    """True when ``.ci/run`` runs all of this."""
+    return lambda: all(text in (ROOT / ".ci" / "run").read_text(encoding="utf-8") for text in texts)
+
+
+def _long(limit: float = 3600.0, **rest: object) -> Case:
+    return Case(long=True, limit=limit, **rest)  # type: ignore[arg-type]
+
+
+_IMPORT = "fric import run.csv --map map.yaml --out bags/run"
+_DESIGN = (
+    "fric identify bags/slide --model config/start_model.yaml --method prediction-error --design --out found "
+    "--limit position=-0.05,0.05 --limit speed=0.3 --limit force=-60,60 --duration 10"
+)
+_TRIBOMETER = "fric import test_data_2.txt --map config/published/tribometer.yaml --out bags/tribometer"
+_CYLINDERS = (
+    "for bar in 1 3 5 7; do fric import O-ring257_${bar}bar.csv --map config/published/cylinder.yaml --repair "
+    "--out bags/cylinder_$bar; done"
+)
+_EMPS = "fric import DATA_EMPS.mat --map config/published/emps.yaml --out bags/emps"
+_SPEEDS = (2, 10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 120, 140, 160, 180, 200)
+_SCREWS = (
+    f"for n in {' '.join(map(str, _SPEEDS))}; do for v in $n n$n; do fric import $v.csv "
+    "--map config/published/screw.yaml --repair --out bags/screw_$v; done; done"
+)
+_TIAGO = "fric import tiago_effort.csv --map config/published/torso.yaml --repair --out bags/torso"
+
+KNOWN: dict[str, Case] = {
+    "python3 -m venv env && . env/bin/activate && pip install . && fric demo --out demo": Case(
+        checked=_in_ci('-m venv "$work/env"', "pip install --quiet '.[test]'")
+    ),
+    "pip install '.[test]' && python -m pytest -n auto --dist worksteal": Case(
+        checked=_in_ci("pip install --quiet '.[test]'", "python -m pytest -n auto --dist worksteal")
+    ),
+    "colcon build && . install/setup.sh && ros2 run fric_nodes plant": Case(tool="colcon", long=True, node="plant"),
+    _IMPORT: Case((_map,)),
+    "fric identify bags/run --terms coulomb,viscous,bias,asymmetry --out found": Case((_after(_IMPORT),)),
+    "fric identify bags/slide --model config/start_model.yaml --out found": Case(),
+    _DESIGN: _long(),
+    "ros2 run fric_nodes excitation --ros-args --params-file found/excitation.yaml": Case((_found,), node="excitation"),
+    "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml --out diagnosis": _long(),
+    "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml": _long(),
+    "fric diagnose bags/slide --blocks 8 --model config/nominal_model.yaml --out diagnosis": _long(),
+    "fric doctor bags/slide": Case(),
+    "fric compare bags/simulated bags/slide --out comparison": Case((_simulated,)),
+    "fric model show found/model.yaml": Case((_found,)),
+    "fric simulate found/model.yaml --force bags/slide --out bags/simulated": Case((_found,)),
+    "fric simulate found/model.yaml --closed-loop config/controller.yaml --reference bags/my_run --out bags/closed": Case(
+        (_found, _followed)
+    ),
+    "ros2 run fric_nodes recorder --ros-args -p bag:=bags/my_run": Case(node="recorder"),
+    "ros2 run fric_nodes player --ros-args -p bag:=bags/slide -p rate:=4.0": Case(node="player"),
+    "ros2 run fric_nodes compensator --ros-args --params-file config/compensator.yaml -p model_file:=found/model.yaml": Case(
+        (_found,), node="compensator"
+    ),
+    **{
+        f"ros2 run fric_nodes {name} --ros-args --params-file config/{name}.yaml": Case((_found,), node=name)
+        for name in ("plant", "excitation", "pid", "identifier", "experiment", "monitor")
+    },
+    f"{_PLANT} -p model_file:=config/contact_model.yaml": Case(node="plant"),
+    **{
+        f"{_PLANT} --params-file config/{name}.yaml": Case(node="plant", long=name != "plant")
+        for name in (
+            "plant",
+            "guideway_plant",
+            "pneumatic_plant",
+            "quarter_car_plant",
+            "test_bed_plant",
+            "pendulum_plant",
+            "cart_pendulum_plant",
+        )
+    },
+    **{
+        f"fric model {what}": Case() for what in ("effects", "effects dwell_time", "schema", "plants", "excitations", "methods")
+    },
+    "fric verify --out verification.html": _long(7200.0),
+    "fric demo": _long(),
+    "fric demo --clock wall": _long(),
+    "fric prove --cases 300 --seed 110 --out proof": _long(4 * 3600.0, status=(0, 1)),
+    **{
+        f"fric bench {name}": _long(4 * 3600.0, status=(0, 1))
+        for name in (
+            "lock-step",
+            "recordings",
+            "fitting",
+            "laws",
+            "calibration",
+            "calibration-oscillation",
+            "calibration-static",
+            "calibration-two-stage",
+            "calibration-tensor-product",
+            "online",
+        )
+    },
+    _TRIBOMETER: Case((_published("test_data_2.txt"),), data=True),
+    "fric diagnose bags/tribometer --blocks 6 --start 8.5 --end 204 --model config/published/tribometer_nominal.yaml "
+    "--out diagnosis": _long(needs=(_after(_TRIBOMETER),), data=True),
+    _CYLINDERS: Case((_published(*(f"O-ring257_{bar}bar.csv" for bar in (1, 3, 5, 7))),), data=True),
+    "fric diagnose bags/cylinder_1 bags/cylinder_3 bags/cylinder_5 bags/cylinder_7 --blocks 6 "
+    "--model config/published/cylinder_nominal.yaml --out diagnosis": _long(needs=(_after(_CYLINDERS),), data=True),
+    _EMPS: Case((_published("DATA_EMPS.mat"),), data=True),
+    "fric diagnose bags/emps --blocks 10 --model config/published/emps_nominal.yaml --out diagnosis": _long(
+        needs=(_after(_EMPS),), data=True
+    ),
+    _SCREWS: _long(
+        needs=(_published(*(f"{sign}{n}.csv" for n in _SPEEDS for sign in ("", "n")), under="driveNo1/steady_state"),),
+        data=True,
+    ),
+    "fric diagnose bags/screw_{2,20,40,60,80,100,140,180,n2,n20,n40,n60,n80,n100,n140,n180} --repair "
+    "--model config/published/screw_nominal.yaml --out diagnosis "
+    "$(printf -- '--validate bags/screw_%s ' 10 30 50 70 90 120 160 200 n10 n30 n50 n70 n90 n120 n160 n200)": _long(
+        needs=(_after(_SCREWS),), data=True
+    ),
+    _TIAGO: Case((_published("tiago_effort.csv", "tiago_position.csv", "tiago_velocity.csv"),), data=True),
+    "fric diagnose bags/torso --blocks 6 --repair --model config/published/torso_nominal.yaml --out diagnosis": _long(
+        needs=(_after(_TIAGO),), data=True
+    ),
+}
+
+
+def _spaced(command: str) -> str:
+    """With single blanks: columns are aligned in print."""
+    return re.sub(r"\s+", " ", command)
+
+
+COMMANDS = [command for command in map(_spaced, _printed()) if not _is_name(command)]
+NAMES = [command for command in map(_spaced, _printed()) if _is_name(command)]
+
+
+def _parameter(command: str) -> object:
+    case = KNOWN.get(command, Case())
+    marks = [pytest.mark.timeout(case.limit)]
+    marks += [pytest.mark.long] if case.long else []
+    marks += [pytest.mark.real_data] if case.data else []
+    return pytest.param(command, marks=marks)
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """A folder like the root of the source tree, with the commands that a shell would find."""
+    folder = tmp_path / "tree"
+    folder.mkdir()
+    for name in ("config", "bags"):
+        shutil.copytree(ROOT / name, folder / name)
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    if shutil.which("ros2") is None:
+        stand_in = tools / "ros2"
+        stand_in.write_text(
+            '#!/bin/sh\n[ "$1 $2" = "run fric_nodes" ] || exit 3\nshift 2\nexec fric node "$@"\n', encoding="utf-8"
+        )
+        stand_in.chmod(0o755)
+    return folder
+
+
+@pytest.fixture
+def path_of_shell(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The environment's own commands first, then those of the test."""
+    monkeypatch.setenv(
+        "PATH", os.pathsep.join([str(Path(sys.executable).parent), str(place.parent / "tools"), os.environ["PATH"]])
+    )
+
+
+def test_commands_are_found_at_all() -> None:
+    assert len(COMMANDS) > 30
+    assert "fric verify --out verification.html" in COMMANDS
+    assert "fric diagnose" in NAMES
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_printed_command_is_known(command: str) -> None:
+    assert command in KNOWN, f"'{command}' is printed: say in KNOWN what it needs, so that it is run"
+
+
+def test_an_unknown_command_is_found() -> None:
+    assert "fric identify x --out y" in _lines("fric identify x \\\n    --out y    # a comment\n\n# another\n")
+    assert _inline("as `fric identify x --out y` does, `… config/a_plant.yaml` and `map.yaml`") == [
+        "fric identify x --out y",
+        "fric node plant --ros-args --params-file config/a_plant.yaml",
+    ]
+    assert not _is_name("fric identify x --out y")
+    assert not _is_name("fric model plants")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_verb_and_option_that_is_named_is_there(name: str, graph: Graph, path_of_shell: None) -> None:
+    verb, options = name.split()[1], [word for word in name.split() if word.startswith("--")]
+    status, out, error = graph.finish(graph.execute("fric", verb, "--help", env={**os.environ, "COLUMNS": "200"}))
+    assert status == 0, error
+    assert all(option in out for option in options), f"fric {verb} has no {options}"
+
+
+@pytest.mark.parametrize("command", [_parameter(command) for command in COMMANDS])
+def test_it_runs_as_printed(command: str, graph: Graph, place: Path, path_of_shell: None) -> None:
+    case = KNOWN[command]
+    if case.checked is not None:
+        assert case.checked()
+        return
+    if case.tool and shutil.which(case.tool) is None:
+        pytest.skip(f"{case.tool} is not installed here")
+    for prepare in case.needs:
+        prepare(place)
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(graph.domain), "ROS_LOG_DIR": str(place / "log")}
+    # A shell gives way to the last command of its line, so that a signal reaches the node itself.
+    process = graph.execute("bash", "-c", f"exec {command}" if case.node else command, cwd=place, env=environment)
+    if case.node:
+        _in_the_graph(graph, case.node, process)
+        status, out, error = graph.finish(process, signal.SIGINT) if process.poll() is None else graph.finish(process)
+    else:
+        status, out, error = graph.finish(process, limit=case.limit)
+    assert status in case.status, f"{command}\n{out}\n{error}"
+    assert "Traceback" not in error, error
+
+
+def _in_the_graph(graph: Graph, name: str, process: object) -> None:
+    watcher = graph.node("watcher")
+    poll = process.poll  # type: ignore[attr-defined]
+    graph.until(lambda: name in watcher.get_node_names() or poll() is not None, f"{name} is there", limit=240.0)
+    until = time.monotonic() + _RUNNING
+    while poll() is None and time.monotonic() < until:
+        time.sleep(0.05)
