@@ -12,6 +12,7 @@ import typer
 
 from ..errors import InputError
 from .identify_joints import ALL, identify_each
+from .identify_method import method_of
 from .identify_shown import print_design, print_intervals, print_result, summary_of, uncertainty_json
 from .options import (
     EndOption,
@@ -140,7 +141,7 @@ def identify(
     options = Options(
         cutoff, decimation, rest_velocity, tuple(hold or ()), tuple(free or ()), robust, horizon, gains, bounds, starts
     )
-    limits, chosen = _limits(design, limit or [], duration), _method(method)
+    limits, chosen = _limits(design, limit or [], duration), method_of(method)
     if not given:
         _design_alone(model, limits, _rig(rig or []), chosen, options, out, as_json, tries)
         return
@@ -154,7 +155,7 @@ def identify(
     records = read_all(given, reading)
     validation = read_all(kept_apart, reading)
     structure = _structure(model, terms, records[0])
-    chosen = _method(method, structure)
+    chosen = method_of(method, structure)
     # What a load or a temperature is relative to belongs to the model: a recording under another load has another mean.
     structure = replace(structure, nominal=nominal_conditions(records) | dict(structure.nominal))
     records, validation = ([replace(each, nominal=structure.nominal) for each in held] for held in (records, validation))
@@ -222,23 +223,6 @@ def _bounds(given: list[str]) -> tuple[tuple[str, float, float], ...]:
             raise InputError("--bound", f"is '{text}'", "give NAME=LO,HI, such as stribeck.velocity=0.001,0.05")
         found.append((name, low, high))
     return tuple(found)
-
-
-def _method(name: str | None, structure: Model | None = None) -> Method:
-    """The method ``name``, or the usual one for ``structure``.
-
-    The filters of inverse dynamics take pre-sliding for inertia and damping: these were off by up to 5 standard errors where
-    it was tried (2 kg, 2e5 N/m, steps of 10 um).
-    """
-    from ..identification import METHODS
-
-    slips = structure is not None and structure.has_slip_dynamics
-    if name == "inverse-dynamics" and slips:
-        raise InputError("--method", "inverse-dynamics gets a model with pre-sliding wrong", "use --method prediction-error")
-    name = name or ("prediction-error" if slips else "inverse-dynamics")
-    if name not in METHODS:
-        raise InputError("--method", f"'{name}' is not known", f"use one of {', '.join(METHODS)}")
-    return METHODS[name]
 
 
 def _limits(design: bool, given: list[str], duration: float | None) -> Limits | None:
