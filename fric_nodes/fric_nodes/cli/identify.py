@@ -12,6 +12,7 @@ import typer
 
 from ..errors import InputError
 from .identify_joints import ALL, identify_each
+from .identify_method import method_of
 from .identify_shown import print_design, print_intervals, print_result, summary_of, uncertainty_json
 from .options import (
     EndOption,
@@ -64,9 +65,11 @@ def identify(
         str, typer.Option("--terms", help="Effects to fit when no model file is given, separated by commas.")
     ] = _DEFAULT_TERMS,
     method: Annotated[
-        str,
-        typer.Option("--method", help="How to fit; 'fric model methods' lists them all, with the experiment that each needs."),
-    ] = "inverse-dynamics",
+        str | None,
+        typer.Option(
+            "--method", help="How to fit ('fric model methods'): inverse-dynamics, with pre-sliding prediction-error."
+        ),
+    ] = None,
     joint: JointsOption = None,
     cutoff: Annotated[
         float | None, typer.Option("--cutoff", help="Low-pass filter on the position [Hz]; a tenth of the rate, at most 100.")
@@ -138,7 +141,7 @@ def identify(
     options = Options(
         cutoff, decimation, rest_velocity, tuple(hold or ()), tuple(free or ()), robust, horizon, gains, bounds, starts
     )
-    limits, chosen = _limits(design, limit or [], duration), _method(method)
+    limits, chosen = _limits(design, limit or [], duration), method_of(method)
     if not given:
         _design_alone(model, limits, _rig(rig or []), chosen, options, out, as_json, tries)
         return
@@ -152,6 +155,7 @@ def identify(
     records = read_all(given, reading)
     validation = read_all(kept_apart, reading)
     structure = _structure(model, terms, records[0])
+    chosen = method_of(method, structure)
     # What a load or a temperature is relative to belongs to the model: a recording under another load has another mean.
     structure = replace(structure, nominal=nominal_conditions(records) | dict(structure.nominal))
     records, validation = ([replace(each, nominal=structure.nominal) for each in held] for held in (records, validation))
@@ -219,14 +223,6 @@ def _bounds(given: list[str]) -> tuple[tuple[str, float, float], ...]:
             raise InputError("--bound", f"is '{text}'", "give NAME=LO,HI, such as stribeck.velocity=0.001,0.05")
         found.append((name, low, high))
     return tuple(found)
-
-
-def _method(name: str) -> Method:
-    from ..identification import METHODS
-
-    if name not in METHODS:
-        raise InputError("--method", f"'{name}' is not known", f"use one of {', '.join(METHODS)}")
-    return METHODS[name]
 
 
 def _limits(design: bool, given: list[str], duration: float | None) -> Limits | None:
@@ -310,7 +306,7 @@ def _fit(
     options: Options,
     experiments: bool,
 ) -> Identification:
-    from ..identification.scoring import score
+    from ..identification.misfit import validated
 
     foreseen = _foresee(structure, records, options, method, experiments)
     progress(f"fitting {', '.join(structure.names)} by {method.id}")
@@ -321,11 +317,7 @@ def _fit(
         "equations": str(result.train.n_samples),
     }
     result = replace(result, model=replace(result.model, provenance=provenance))
-    if validation:
-        notes = tuple(f"validation, {record.source}: {note}" for record in validation for note in record.notes)
-        notes += result.remarks_on(validation)
-        result = replace(result, validation=score(result.model, validation, options), notes=(*result.notes, *notes))
-    return result
+    return validated(result, method, records, validation, options) if validation else result
 
 
 def _write(

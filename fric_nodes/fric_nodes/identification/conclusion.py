@@ -11,6 +11,7 @@ from ..model import Model
 from ..record import Array, Record
 from .equations import Equations
 from .free_parameters import FreeParameters
+from .misfit import misfit, refuse_undetermined
 from .result import Identification, Options
 from .scoring import score
 from .verdict import warnings_of
@@ -46,17 +47,26 @@ def standard_errors(free: FreeParameters, covariance: Array) -> dict[str, float]
 
 
 def concluded(method: str, fitted: Fitted, records: Sequence[Record], options: Options, trouble: str = "") -> Identification:
-    """The result of ``method``; ``trouble`` replaces the status when the fit didn't end well."""
+    """The result of ``method``; ``trouble`` replaces the status when the fit didn't end well.
+
+    Raises:
+        IdentificationError: the fit has found nothing (:func:`fric_nodes.identification.misfit.refuse_undetermined`).
+    """
     model = fitted.model.with_values(fitted.model.values, standard_errors(fitted.free, fitted.covariance))
     warnings, status = warnings_of(model, fitted.free, fitted.covariance)
+    # Structures are compared by equations that are the same for all of them.
+    train = score(model, records, options, None if model.has_slip_dynamics else fitted.found)
+    source = ", ".join(record.source for record in records)
+    if not trouble:
+        refuse_undetermined(model, fitted.free, fitted.covariance, fitted.found, train, source)
+    wrong = misfit(model, fitted.found, train)
     return Identification(
         model=model,
         fitted=fitted.free.names,
         covariance=fitted.covariance,
         method=method,
-        status=trouble or status,
-        warnings=(*fitted.messages, *warnings),
+        status=trouble or wrong or status,
+        warnings=(*fitted.messages, *warnings, *([wrong] if wrong and trouble else [])),
         notes=fitted.found.notes,
-        # Structures are compared by equations that are the same for all of them.
-        train=score(model, records, options, None if model.has_slip_dynamics else fitted.found),
+        train=train,
     )

@@ -265,7 +265,7 @@ def _clear_band(record: Record) -> float:
     """Cutoff up to which the speed that the position's errors may show stays below what counts as rest [Hz]."""
     position = record.position[record.mask]
     speed = float(np.quantile(np.abs(np.gradient(position, record.sample_time)), 0.98))
-    noise = level_of(position)
+    noise = max(level_of(position), 1e-300)
     return float((0.25 * SLOW * speed / (2.0 * np.pi * noise * np.sqrt(2.0 / 3.0 * record.sample_time))) ** (2.0 / 3.0))
 
 

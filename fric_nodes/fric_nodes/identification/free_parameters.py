@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..model import Model
+from ..model import Model, NamedParameter
 from ..record import Array, Index, Mask
 from .equations import Equations
 from .result import Options
@@ -41,6 +41,8 @@ class FreeParameters:
     def of(cls, model: Model, options: Options) -> FreeParameters:
         """All parameters of ``model`` but those held by the options and shape parameters that were not freed.
 
+        A parameter of the plant that is given as 0 (no spring, no damper) is held as well, unless it is freed.
+
         Raises:
             InputError: an option names a parameter that the model doesn't have, or bounds that leave nothing between them.
         """
@@ -50,7 +52,8 @@ class FreeParameters:
         free = [
             (number, parameter)
             for number, parameter in enumerate(model.parameters())
-            if parameter.name not in options.held and (not parameter.declaration.shape or parameter.name in options.freed)
+            if parameter.name not in options.held
+            and (parameter.name in options.freed or not (parameter.declaration.shape or _absent(parameter)))
         ]
         declared = [parameter.declaration for _, parameter in free]
         tiny = np.finfo(np.float64).tiny
@@ -108,6 +111,11 @@ class FreeParameters:
     def only(self, linear: bool) -> FreeParameters:
         """The linear ones, or the others."""
         return self.without({name for name, is_linear in zip(self.names, self.linear, strict=True) if is_linear != linear})
+
+
+def _absent(parameter: NamedParameter) -> bool:
+    """True for what a plant is said to be without."""
+    return parameter.value == 0.0 and "." not in parameter.name
 
 
 def candidates(dimension: str, equations: Equations, level: float) -> Array:

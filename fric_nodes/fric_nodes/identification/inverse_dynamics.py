@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
@@ -24,6 +25,7 @@ from .conclusion import Fitted, concluded
 from .equations import Equations, equations
 from .filter_bias import residual_of_filters
 from .free_parameters import FreeParameters, candidates
+from .nested import best_with_nested, searched_terms
 from .noise_bias import noise_bias, timing_covariance, unsure_by
 from .result import Identification, IdentificationError, Method, Options
 from .scoring import driving_force, force_along
@@ -87,11 +89,12 @@ def _fit_linear(model: Model, found: Equations, free: FreeParameters, use: Mask,
     scale[scale == 0.0] = 1.0
     weight = use.astype(np.float64)
     solution = np.zeros(free.index.shape[0])
-    for _ in range(_REWEIGHTINGS):
+    for _ in range(_REWEIGHTINGS if robust else 1):
         root = np.sqrt(weight)
-        answer = lsq_linear(
-            (root[:, None] * part / scale)[use], (root * target)[use], bounds=(free.lower * scale, free.upper * scale)
-        )
+        # The triangle has the same solution as all the rows, and a solver with bounds goes over it many times.
+        rows = (root[:, None] * np.column_stack([part / scale, target]))[use]
+        triangle: Any = np.linalg.qr(rows, mode="r")
+        answer = lsq_linear(triangle[:, :-1], triangle[:, -1], bounds=(free.lower * scale, free.upper * scale))
         previous, solution = solution, np.asarray(answer.x) / scale
         residual = target - part @ solution
         weight = weights(residual, use, robust)
@@ -108,10 +111,16 @@ def _cost(residual: Array, use: Mask, robust: bool) -> float:
 
 
 def _search_static(model: Model, found: Equations, free: FreeParameters, robust: bool) -> Model:
-    """The static structure with linear parameters solved for and nonlinear ones chosen on their grid."""
+    """The static structure with linear parameters solved for and nonlinear ones chosen on their grid.
+
+    The grid is searched from the values given and from where the terms that have to be searched for do nothing.
+    """
     linear, nonlinear = free.only(True), free.only(False)
     use = found.clear
     best = _fit_linear(model, found, linear, use, robust)
+    for each in searched_terms(model, free):
+        bare = _fit_linear(each.away(model.with_values(best.values)), found, linear, use, robust)
+        best = bare if bare.cost < best.cost else best
     level = float(np.median(np.abs(found.force[use])))
     declared = list(model.parameters())
     for number, lower, upper in zip(nonlinear.index, nonlinear.lower, nonlinear.upper, strict=True):
@@ -182,6 +191,19 @@ def _refine(model: Model, found: Equations, free: FreeParameters, use: Mask, rob
     return model.with_values(values), left, jacobian, weight
 
 
+def _nested_static(model: Model, found: Equations, free: FreeParameters, robust: bool) -> Model:
+    """The best fit of a structure without slip dynamics, no worse than that of any part of it that does without a term."""
+    use = rows_of_fit(model, found)
+
+    def fit(start: Model, now: FreeParameters) -> tuple[Model, float]:
+        ended, left, _, _ = _refine(_search_static(start, found, now, robust), found, now, use, robust)
+        return ended, _cost(left, use, robust)
+
+    if not searched_terms(model, free):
+        return _search_static(model, found, free, robust)
+    return best_with_nested(model, free, fit, lambda one: one)[0][0]
+
+
 def _typical(model: Model, found: Equations, free: FreeParameters) -> Array:
     """Typical size of each free parameter, for those that start at zero."""
     force = float(np.std(found.force))
@@ -208,7 +230,10 @@ def fit_force(model: Model, records: Sequence[Record], options: Options) -> Fitt
     messages = [twin.message for twin in twins]
     free = free.without({twin.name for twin in twins})
     static_free = static_free.without({twin.name for twin in twins})
-    static = _search_static(static, found, static_free, options.robust)
+    if model.has_slip_dynamics:
+        static = _search_static(static, found, static_free, options.robust)
+    else:
+        static = _nested_static(static, found, static_free, options.robust)
     by_name = {parameter.name: parameter.value for parameter in static.parameters()}
     model = model.with_values(np.array([by_name.get(p.name, p.value) for p in model.parameters()]))
     if model.has_slip_dynamics:

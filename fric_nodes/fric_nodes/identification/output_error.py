@@ -36,6 +36,7 @@ from .free_parameters import FreeParameters
 from .gauss_newton import Solution, minimise
 from .multi_start import best_of, spread_starts
 from .multiple_shooting import Shooting, shooting
+from .nested import best_with_nested
 from .problem import Problem
 from .result import Identification, Method, Options
 
@@ -47,6 +48,7 @@ _MOST_SLOW = 3  # steps: where differences can't see the minimum any better
 _WIDEST = 0.2  # relative, of secants over the uncertainty
 _DRAWS = 60  # of force errors: their spread is known to a tenth
 _BRIEF = 8  # iterations, after which a start that is far behind is given up
+_ABOVE = 2.0  # times the cost at hand
 _ROUNDS = 6  # at most, of parameters with the starts' influence held, and starts
 _SETTLED = 0.02  # standard errors: a change of the parameters that needs no further round
 _LOST = 0.5  # of the recorded motion's standard deviation: an error that says that the model goes elsewhere
@@ -201,23 +203,59 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
         return _minimised(model, free, runs.refined(model))
 
     best, ends = best_of(briefly, to_the_end, starts, free)
+    given = best
+
+    def fit(model: Model, now: FreeParameters) -> _Found:
+        if now is free and model is given.model:
+            return given
+        brief = _minimised(model, now, runs.refined(model), _BRIEF, 1)
+        # What is far behind after a few steps will not end below.
+        return brief if brief.cost > _ABOVE * given.cost else _minimised(brief.model, now, runs.refined(brief.model))
+
+    best, without = best_with_nested(best.model, free, fit, lambda one: (one.model, one.cost))
+    free = free.without(set(without))
+    messages = list(begun.messages)
+    if without:
+        messages.append(f"{', '.join(sorted(without))}: left at nothing, since the free run is followed no better with it")
     if not options.start_states and not best.runs.tied and best.runs.start_matters(best.model):
         options = replace(options, start_states="tied")
         tied = replace(best.runs, tied=True).weighed(best.model, force_errors(best.model, free, found))
         best = _minimised(best.model, free, tied)
+    covariance = _covariance(best, free, found, options, known)
+    lost = _lost(best.model, free, covariance, known)
+    if lost:
+        free = free.without(set(lost))
+        best = _minimised(best.model.with_values(_with(best.model, start, lost)), free, best.runs)
+        covariance = _covariance(best, free, found, options, known)
+        messages.append(f"{', '.join(lost)}: a free run can't tell; held at the value that inverse dynamics finds")
     trouble = _escape(best, options)
     if not trouble and not best.answer.converged:
         remedy = "start nearer to the machine's values (--model), or shorten the runs (--horizon)"
         trouble = f"not converged after {best.answer.iterations} steps; {remedy}"
-    covariance = _covariance(best, free, found, options, known)
     covariance, doubts = reconciled(best.model, free, covariance, begun)
-    fitted = Fitted(best.model, free, covariance, found, [*begun.messages, *doubts])
+    fitted = Fitted(best.model, free, covariance, found, [*messages, *doubts])
     result = concluded(METHOD.id, fitted, records, options, trouble)
     if options.starts <= 1:
         return result
-    errors = np.sqrt(np.diag(covariance))
+    fitted_errors = dict(zip(free.names, np.sqrt(np.diag(covariance)), strict=True))
+    errors = np.array([fitted_errors.get(name, np.nan) for name in ends.names])
     doubt = ends.warning(errors)
     return replace(result, notes=(*result.notes, ends.note(errors)), warnings=(*result.warnings, *([doubt] if doubt else [])))
+
+
+def _lost(model: Model, free: FreeParameters, covariance: Array, known: Mapping[str, float]) -> list[str]:
+    """Parameters to be searched for whose error in the free run is as large as their value, and larger than by the force."""
+    errors = np.sqrt(np.diag(covariance))
+    return [
+        name
+        for k, name in enumerate(free.names)
+        if not free.linear[k] and not errors[k] < abs(model.value(name)) and known[name] < min(errors[k], np.inf)
+    ]
+
+
+def _with(model: Model, other: Model, names: Sequence[str]) -> Array:
+    """The values of ``model``, those of ``names`` as in ``other``, shape ``(n_parameters,)``."""
+    return np.where([name in names for name in model.names], other.values, model.values)
 
 
 def _escape(best: _Found, options: Options) -> str:

@@ -1,5 +1,7 @@
 """What in a recording is not the free axis: end stops and saturated drives, recognised, left out and named.
 
+Folds and spikes are put right before (:mod:`fric_nodes.signals.conditioning`): a stop is where an angle doesn't go on.
+
 A drive at its limit is no reason to leave anything out as long as the force recorded is the one that acted.
 
 How they are recognised: :mod:`fric_nodes.instrument.end_stop` and :mod:`fric_nodes.instrument.saturation`.
@@ -16,6 +18,7 @@ from ..instrument.end_stop import stops
 from ..instrument.saturation import clipped, plateaus
 from ..instrument.view import View
 from ..record import Record
+from ..signals.conditioning import conditioned
 
 __all__ = ["screened"]
 
@@ -23,7 +26,12 @@ _MARGIN = 0.1  # [s] left out on either side of a stop: impact and ring-down
 
 
 def screened(record: Record) -> Record:
-    """``record`` with what is not the free axis marked invalid and named in its notes."""
+    """``record`` conditioned, with what is not the free axis marked invalid, all named in its notes.
+
+    Raises:
+        RecordError: a position jumps in a way that no motion and no known fold makes.
+    """
+    record = conditioned(record)
     bad = np.zeros(record.n_samples, dtype=np.bool_)
     notes: list[str] = []
     for first, last, note in (*_end_stops(View(record)), *_saturation(View(record))):

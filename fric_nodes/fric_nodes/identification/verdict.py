@@ -85,7 +85,8 @@ def warnings_of(model: Model, free: FreeParameters, covariance: Array) -> tuple[
     """Warnings about the fitted values, and the status sentence that says what to do next."""
     warnings = []
     variance = np.diag(covariance)
-    errors = np.sqrt(np.where(variance >= 0, variance, 0.0))
+    known = variance >= 0.0  # False for NaN: what isn't known is not small
+    errors = np.sqrt(np.where(known, variance, np.inf))
     values = model.values[free.index]
     declared = list(model.parameters())
     bound = free.at_bound(model)
@@ -96,11 +97,14 @@ def warnings_of(model: Model, free: FreeParameters, covariance: Array) -> tuple[
         if bound[number]:
             unsure.append(name)
             warnings.append(f"{name} lies on its bound ({value:.3g} {unit}): this recording shows nothing of it")
+        elif not known[number]:
+            unsure.append(name)
+            warnings.append(f"{name} is not determined: {value:.3g} {unit}, with no standard error")
         elif error > _UNSURE * abs(value):
             unsure.append(name)
             warnings.append(f"{name} is hardly determined: {value:.3g} +- {error:.2g} {unit}")
     scale = np.where(errors > 0, errors, np.inf)
-    correlation = covariance / np.outer(scale, scale)
+    correlation = np.where(np.isfinite(covariance), covariance, 0.0) / np.outer(scale, scale)
     for i in range(len(free.names)):
         for j in range(i):
             if abs(correlation[i, j]) > _CORRELATED:

@@ -238,6 +238,14 @@ def _stuck(record: Record, random: np.random.Generator, name: str) -> Record:
     return replace(record, **{name: values})
 
 
+def _spiked(record: Record, random: np.random.Generator, name: str) -> Record:
+    """Single samples that are off by one to three times the range of the signal."""
+    signal = record.signals()[name].copy()
+    at = random.choice(np.arange(50, record.n_samples - 50), 3, replace=False)
+    signal[at] += float(np.ptp(signal)) * random.uniform(1.0, 3.0, 3) * random.choice([-1.0, 1.0], 3)
+    return replace(record, position=signal) if name == "position" else replace(record, effort=signal)
+
+
 def _with_model(motions: tuple[str, ...], change: Callable[[Record, np.random.Generator], Record]) -> Callable[[int], Trial]:
     def make(seed: int) -> Trial:
         record, rig, _, random = _base(seed, motions)
@@ -317,6 +325,8 @@ FAULTS: tuple[Fault, ...] = (
     _fault("drive compensates friction", "compensated_drive", _first(_helped)),
     _fault("frozen effort", "frozen", _done(_BUSY, lambda r, g: _stuck(r, g, "effort"))),
     _fault("frozen position", "frozen", _done(ACTIVE, lambda r, g: _stuck(r, g, "position"))),
+    _fault("spikes of the position", "position_steps", _done(_BUSY, lambda r, g: _spiked(r, g, "position")), "warning"),
+    _fault("spikes of the effort", "position_steps", _done(_BUSY, lambda r, g: _spiked(r, g, "effort")), "warning"),
     _fault("effort missing", "frozen", _done(_BUSY, lambda r, _: replace(r, effort=np.zeros(r.n_samples)))),
 )  # fmt: skip
 """Every fault."""
