@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from fric_nodes.diagnosis import diagnose
 from fric_nodes.diagnosis.prove import draw
-from fric_nodes.diagnosis.start import evenly_stamped, lateness
+from fric_nodes.diagnosis.start import lateness
 from fric_nodes.identification.innovations import runs_of
 from fric_nodes.instrument import inspect
-from fric_nodes.instrument.stamps import with_even_stamps
 from fric_nodes.record import Array, Record
+from fric_nodes.signals.stamps import evened
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -102,9 +102,7 @@ def test_uneven_stamps_of_an_uneven_log_are_left_as_they_are() -> None:
         logs.append(
             replace(record, time=time, position=record.position[kept], effort=record.effort[kept], effort_hold="linear")
         )
-    kept_as_it_is, notes = evenly_stamped(logs[:1], case.nominal)
-    assert kept_as_it_is[0] is logs[0]
-    assert notes == []
+    assert evened(logs[0]) is logs[0]
     assert not diagnose(logs[:1], logs[1:], case.nominal).findings
 
 
@@ -117,12 +115,12 @@ def test_jitter_is_not_taken_for_lost_samples_nor_one_lost_sample_for_jitter(los
     stamps = next(check for check in inspect([logged]) if check.check == "stamps")
     assert words in stamps.detail
     assert ("missing" in stamps.detail) == bool(lost)
-    assert float(np.max(np.abs(np.diff(with_even_stamps(logged).time) - np.diff(whole.time[kept])))) < 1e-3 * whole.sample_time
+    assert float(np.max(np.abs(np.diff(evened(logged).time) - np.diff(whole.time[kept])))) < 1e-3 * whole.sample_time
 
 
 def test_even_stamps_are_found_beside_gaps() -> None:
     record = _jittering(draw(4, "nothing").train[0], 0.05, 3)
     kept = np.concatenate([np.arange(700), np.arange(900, 1500), np.arange(1503, 4000)])
     holed = replace(record, time=record.time[kept], position=record.position[kept], effort=record.effort[kept])
-    even = with_even_stamps(holed)
+    even = evened(holed)
     assert float(np.max(np.abs(even.time - record.sample_time * kept))) < 0.2 * record.sample_time

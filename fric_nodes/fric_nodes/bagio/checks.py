@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..record import Array, Mask
+from ..signals.stamps import rounded_grid, unwrapped_stamps
 from .clocks import SMOOTH, is_seldom, place
 from .errors import BagError
 from .topics import Topic
@@ -32,6 +33,8 @@ __all__ = ["MIN_SAMPLES", "Samples", "Stamps", "check_samples", "gap_length_ns",
 Stamps = NDArray[np.int64]
 
 MIN_SAMPLES = 10
+HELD = ("following", "preceding")
+"""Holds that a stamp begins or ends."""
 _JUMP_NS = 10_000_000_000
 _GAP_FLOOR_NS = 50_000_000
 _GAP_MEDIANS = 10
@@ -50,14 +53,14 @@ class Samples:
         signals: by name, ``position`` and ``effort`` among them.
         valid: False where a sample must not be used.
         notes: what was done.
-        hold: of the effort, see :attr:`fric_nodes.record.Record.effort_hold`; ``linear`` when a repair broke what was declared.
+        hold: of the effort, see :attr:`fric_nodes.record.Record.effort_hold`; ``unknown`` when a repair broke it.
     """
 
     time_ns: Stamps
     signals: dict[str, Array]
     valid: Mask
     notes: list[str] = field(default_factory=list)
-    hold: str = "linear"
+    hold: str = "unknown"
 
     def keep(self, chosen: Mask | slice) -> None:
         """Leave out all but the chosen samples."""
@@ -155,11 +158,29 @@ def check_samples(where: object, samples: Samples, *, repair: bool, received: bo
     """
     _enough(where, samples)
     otherwise = ", or read by time of reception with --time log" if received else ""
+    _recognised(samples)
     _jumps(where, samples, repair, otherwise)
     _order(where, samples, repair, otherwise)
     _finite(where, samples, repair)
     _gaps(where, samples, repair)
     _enough(where, samples)
+
+
+def _recognised(samples: Samples) -> None:
+    """Stamps that a counter has wrapped, or that are an even grid rounded, are what they stand for."""
+    seconds = (samples.time_ns - samples.time_ns[0]) * 1e-9
+    unwrapped = unwrapped_stamps(seconds)
+    if unwrapped is not None:
+        seconds, wrap, times = unwrapped
+        samples.notes.append(f"the stamps start again {times} time(s), as a counter does after {wrap:.6g} s: they run on")
+    # Single precision rounds the stamps themselves, not what they are from the first on.
+    rounded = rounded_grid(seconds)
+    if rounded is not None:
+        seconds, step = rounded
+        rate = 1.0 / float(seconds[1] - seconds[0])
+        samples.notes.append(f"the stamps are rounded to {1e3 * step:.3g} ms: taken as even at {rate:.5g} Hz")
+    if unwrapped is not None or rounded is not None:
+        samples.time_ns = samples.time_ns[0] + np.rint((seconds - seconds[0]) * 1e9).astype(np.int64)
 
 
 def _enough(where: object, samples: Samples) -> None:
@@ -221,7 +242,7 @@ def _filled(name: str, samples: Samples, finite: Mask, seldom: bool) -> tuple[st
         placed = place(name, time, time[finite], signal[finite], samples.hold, samples.signals.get("position"))
         samples.signals[name] = placed.values
         every = float(np.median(np.diff(np.flatnonzero(finite))))
-        held = name == "effort" and samples.hold != "linear"
+        held = name == "effort" and samples.hold in HELD
         step = f"; from here on it counts as held over one step of {np.median(np.diff(time)) * 1e3:.4g} ms" if held else ""
         return f"a value every {every:g} rows, filled {placed.how}{step}", placed.bridged
     rows = np.flatnonzero(finite)
@@ -299,11 +320,9 @@ def _order(where: object, samples: Samples, repair: bool, otherwise: str) -> Non
     if share > _LOST:
         remedy = "give the time as a period in the mapping, or export it with more digits" if not otherwise else "record again"
         raise BagError(where, f"{100 * share:.0f} % of the stamps go back or repeat an earlier one: too many to drop", remedy)
-    if share > _HOLD_BROKEN and samples.hold != "linear":
-        samples.notes.append(
-            f"the effort was held from stamp to stamp ({samples.hold}); with so many dropped it no longer is: linear"
-        )
-        samples.hold = "linear"
+    if share > _HOLD_BROKEN and samples.hold in HELD:
+        samples.notes.append(f"the effort was held from stamp to stamp ({samples.hold}); with so many dropped it no longer is")
+        samples.hold = "unknown"
     samples.keep(~(back | again))
 
 

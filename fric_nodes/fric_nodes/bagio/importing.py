@@ -81,6 +81,8 @@ class _Import:
     def __init__(self, path: Path, mapping: ImportMap, options: TextOptions) -> None:
         self.path = path
         self.mapping = mapping
+        # A mean over the sample before is, to a model, a force that was held over it.
+        self._hold = "preceding" if mapping.effort_hold == "mean" else mapping.effort_hold
         self.options = options
         self.tables: dict[Path, Table] = {}
         self.si: dict[str, str] = {}
@@ -127,7 +129,7 @@ class _Import:
         position_unit = self._position_unit()
         time, together, start = self._finite_time(time, together, repair)
         time_ns = np.rint(time * 1e9).astype(np.int64)
-        samples = Samples(time_ns, together, np.ones(time.size, dtype=np.bool_), self.notes, mapping.effort_hold)
+        samples = Samples(time_ns, together, np.ones(time.size, dtype=np.bool_), self.notes, self._hold)
         check_samples(self.path, samples, repair=repair, received=False)
         self._own_times(samples, start, repair)
         kept = samples.signals
@@ -247,7 +249,7 @@ class _Import:
                 assert entry.time is not None  # as chosen above
                 own = self._raw("time", entry.time, entry.file) - start
             own, values = self._own_samples(name, own, values, repair)
-            placed = place(name, base, own, values, self.mapping.effort_hold, samples.signals.get("position"))
+            placed = place(name, base, own, values, self._hold, samples.signals.get("position"))
             out = ~np.isfinite(placed.values)
             outside |= out
             samples.signals[name] = placed.values

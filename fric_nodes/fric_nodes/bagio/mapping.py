@@ -69,7 +69,7 @@ class ImportMap(_Strict):
             integrated.
         extra: further signals by name.
         delimiter, decimal, skip_rows, header: how to read a text file; found out when not given.
-        effort_hold: see :class:`~fric_nodes.record.Record`.
+        effort_hold: see :class:`~fric_nodes.record.Record`; ``mean``, over the sample before, is ``preceding``.
     """
 
     joint: str = "axis"
@@ -85,7 +85,7 @@ class ImportMap(_Strict):
     decimal: Literal[".", ","] | None = None
     skip_rows: int | None = Field(default=None, ge=0)
     header: bool | None = None
-    effort_hold: Literal["following", "preceding", "linear"] = "linear"
+    effort_hold: Literal["following", "preceding", "mean", "linear", "unknown"] = "unknown"
 
     @model_validator(mode="after")
     def _moves(self) -> ImportMap:

@@ -30,7 +30,7 @@ from .types import ARRAYS, FLOAT32, FLOAT64, JOINT_TYPES, REFERENCE, STAMPED_FOR
 __all__ = ["BagInfo", "EffortFrom", "TimeFrom", "Topics", "bag_info", "iterate_raw", "joint_list", "read_record"]
 
 TimeFrom = Literal["stamp", "log"]
-_HOLDS = ("following", "preceding", "linear")
+_HOLDS = ("following", "preceding", "linear", "unknown")
 
 
 class BagInfo(NamedTuple):
@@ -157,13 +157,13 @@ class _Reading:
         signals["effort"] = effort.values
         self.notes += effort.notes
         self._optional(states, raw, signals)
-        samples = Samples(time_ns, signals, effort.valid, [])
+        hold = "following" if effort.commanded else effort.hold or custom.get("fric.effort_hold", "unknown")
+        samples = Samples(time_ns, signals, effort.valid, [], hold if hold in _HOLDS else "unknown")
         own_invalid = _stored_invalid(custom, samples.time_ns.size)
         samples.valid &= own_invalid
         if effort.commanded:
             self._after_first_command(samples)
         check_samples(self.where, samples, repair=self.repair)
-        hold = "following" if effort.commanded else effort.hold or custom.get("fric.effort_hold", "linear")
         kept = samples.signals
         return Record(
             time=(samples.time_ns - samples.time_ns[0]) * 1e-9,
@@ -176,7 +176,7 @@ class _Reading:
             joint=states.joint,
             units=self._units(units),
             source=str(self.where),
-            effort_hold=hold if hold in _HOLDS else "following",
+            effort_hold=samples.hold,
             notes=(*_stored_notes(custom), *self.notes, *samples.notes),
         )
 

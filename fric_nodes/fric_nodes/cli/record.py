@@ -23,8 +23,8 @@ def record(
     compression: Annotated[str, typer.Option("--compression", help="none or zstd.")] = "none",
     joint: Annotated[str, typer.Option("--joint", help="Name of the joint, for those who read the bag.")] = "axis",
     effort_hold: Annotated[
-        str, typer.Option("--effort-hold", help="When a recorded effort acts: preceding, following or linear.")
-    ] = "linear",
+        str, typer.Option("--effort-hold", help="When a recorded effort acts: preceding, following, linear, or unknown.")
+    ] = "unknown",
     log_time: Annotated[str, typer.Option("--log-time", help="receive, or the messages' own stamp.")] = "receive",
 ) -> None:
     """Record until Ctrl-C; a recorder that is killed leaves a bag that every verb reads."""

@@ -23,6 +23,7 @@ from ..instrument import Finding as Check
 from ..model import Model, Term
 from ..record import Array, Record
 from ..signals.resolution import noise_of
+from ..signals.stamps import evened
 from ..threads import linear_algebra_in_one
 from .blocks import one_sided
 from .candidates import FRICTION, Scales, candidates, place_of, scales_of
@@ -56,7 +57,6 @@ from .start import (
     FAST,
     FIRST_FIT,
     DiagnosisError,
-    evenly_stamped,
     held_as,
     lateness,
     refuse_other_plant,
@@ -138,8 +138,8 @@ def diagnose(
     conditions = nominal_conditions(train) | dict(nominal.nominal)
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
-    (train, evened), (validation, evened_too) = (evenly_stamped(held, nominal) for held in (train, validation))
-    corrected += [*evened, *evened_too]
+    train, validation = ([evened(record) for record in held] for held in (train, validation))
+    corrected += [f"{record.source}: {note}" for record in (*train, *validation) for note in record.notes if "jitter" in note]
     tracks, start = started(nominal, train)
     refuse_other_plant(train, tracks[0], start)
     corrected += held_as(tracks[0])

@@ -15,7 +15,6 @@ from ..effect import Place
 from ..errors import InputError
 from ..identification import METHODS
 from ..identification.result import IdentificationError, Options
-from ..instrument.stamps import with_even_stamps
 from ..model import Model, build_model
 from ..plants import PLANTS
 from ..record import Record
@@ -29,7 +28,6 @@ __all__ = [
     "FAST",
     "FIRST_FIT",
     "DiagnosisError",
-    "evenly_stamped",
     "held_as",
     "lateness",
     "refuse_other_plant",
@@ -48,8 +46,6 @@ _LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of
 _EXPLAINED = 0.02  # of the force: a plant that leaves less of it may be the one recorded
 _FAR_BETTER = 0.25  # of what the given plant leaves: where a mass with the same terms leaves less, it is another plant
 _HELD_LATE = 0.1  # of a sample: less isn't worth a word
-_JITTERS = 0.02  # of a sample: stamps that are evener are left as they are
-_MUCH_BETTER = 0.7  # of what the stamps as they are leave
 _HELD = 0.65  # of a sample: a force that acts later than that, or earlier, does so for another reason
 
 
@@ -78,31 +74,6 @@ def started(nominal: Model, train: Sequence[Record], as_given: bool = False) -> 
         tracks = [replace(track, mass=nominal.total_inertia) for track in tracks]
     # Lag and viscous friction that are left out can make up a mass, too: what is plausible beside either is plausible.
     return [replace(track, given=nominal.total_inertia) for track in tracks], best.model
-
-
-def evenly_stamped(records: Sequence[Record], nominal: Model) -> tuple[list[Record], list[str]]:
-    """The recordings with even stamps, where theirs jitter and the model fits far better without that, and a note of it.
-
-    A driver that samples by a clock and stamps what it has read when it comes around to it stamps unevenly what is even; one
-    that samples when it comes around to it stamps as it should. Only the motion tells which.
-    """
-    given, evened = list(records), [with_even_stamps(record) for record in records]
-    jitter = max(float(np.std(b.time - a.time)) / a.sample_time for a, b in zip(given, evened, strict=True))
-    if nominal.plant.led or jitter < _JITTERS:
-        return given, []
-    lacks = []
-    for held in (given, evened):
-        model = _by_inverse_dynamics(nominal, held) or nominal
-        track = tracks_of(held, model)[-1]
-        residual = track.fit(model, free_names(model), FIRST_FIT, bounds_of(model, scales_of(track))).residual
-        lacks.append(float(residual @ residual))
-    if lacks[1] > _MUCH_BETTER * lacks[0]:
-        return given, []
-    note = (
-        f"stamps of {given[0].source} jitter by {100.0 * jitter:.2g} % of a sample, and the motion does not: taken as even, "
-        f"which leaves {lacks[0] / max(lacks[1], 1e-300):.2g} times less unexplained; stamp where the sensor is read"
-    )
-    return evened, [note]
 
 
 def _by_inverse_dynamics(model: Model, train: Sequence[Record]) -> Model | None:

@@ -6,20 +6,17 @@ while both usually change, is the one before again. The value is the share of sa
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from ..record import Array, Record
+from ..signals.stamps import grid_of
 from .check import Check, Evidence, Finding, Verdict, each
 from .view import View, runs
 
-__all__ = ["CHECK", "repeated", "with_even_stamps"]
+__all__ = ["CHECK", "repeated"]
 
 _FAULT = 0.04
 _JITTER_FAULT = 0.35
 _JITTER = 0.1
-_NONE_LOST = 0.5  # of a sample
 _CHANGES = 0.7  # share of samples, in the quicker half of the motion, that a signal has to change at
 
 
@@ -42,38 +39,12 @@ def repeated(view: View) -> float:
     return float(np.mean((~quick & still_effort)[fast]))
 
 
-def with_even_stamps(record: Record) -> Record:
-    """``record`` with stamps a whole number of samples apart, but across gaps."""
-    line = _without_gaps(record)
-    if line is not None:
-        return replace(record, time=line - line[0])
-    step = np.diff(record.time)
-    apart = np.maximum(np.round(step / record.sample_time), 1.0)
-    number = np.concatenate([[0.0], np.cumsum(apart)])
-    pieces = np.split(np.arange(number.shape[0]), np.flatnonzero(apart > 1.0) + 1)
-    period = float(np.polyfit(number, record.time, 1)[0])
-    time = np.empty_like(record.time)
-    for piece in pieces:
-        time[piece] = period * number[piece] + float(np.mean(record.time[piece] - period * number[piece]))
-    time -= time[0]
-    return replace(record, time=time) if np.all(np.diff(time) > 0.0) else record
-
-
-def _without_gaps(record: Record) -> Array | None:
-    """Even stamps [s], where none of the record's own is half a sample or more away from one: then no sample is missing."""
-    every = np.arange(record.n_samples, dtype=np.float64)
-    line = np.asarray(np.polyval(np.polyfit(every, record.time, 1), every))
-    # One lost sample alone shifts what comes after it by one: no line is closer than half a sample then.
-    return line if float(np.max(np.abs(record.time - line))) < _NONE_LOST * record.sample_time else None
-
-
 def _judge(view: View, evidence: Evidence) -> Finding:
     time = view.record.time
     step = np.diff(time)
-    usual = view.record.sample_time
-    missing = np.maximum(np.round(step / usual) - 1.0, 0.0)
-    if _without_gaps(view.record) is not None:
-        missing[:] = 0.0
+    grid = grid_of(time)
+    usual = grid.period
+    missing = np.diff(grid.number) - 1.0
     lost = float(np.sum(missing)) / (time.size + float(np.sum(missing)))
     again = repeated(view) if view.moves else float("nan")
     again = 0.0 if np.isnan(again) else again
@@ -89,6 +60,8 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     uneven = max(jitter, spread)
     if uneven > _JITTER:
         parts.append(f"stamps jitter by {100 * uneven:.0f} % of a step")
+    # What was made of them when the recording was made ready for use.
+    parts += [note for note in view.record.notes if note.startswith(("stamps jitter", "the stamps"))]
     bad = share > _FAULT or uneven > _JITTER_FAULT
     verdict: Verdict = "fault" if bad else "warning" if parts else "ok"
     remedy = (

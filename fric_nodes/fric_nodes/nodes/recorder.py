@@ -46,7 +46,7 @@ PARAMETERS = (
     NodeParameter("joint", "axis", "name of the joint, for those who read the bag"),
     NodeParameter("position_unit", "m", "unit of positions, for those who read the bag"),
     NodeParameter("force_unit", "N", "unit of efforts, for those who read the bag"),
-    NodeParameter("effort_hold", "preceding", "when an effort acts", choices=("following", "preceding", "linear")),
+    NodeParameter("effort_hold", "preceding", "when an effort acts", choices=("following", "preceding", "linear", "unknown")),
     NodeParameter("queue_depth", 5000, "messages that may wait on each topic between two rounds", lower=1, upper=1_000_000),
     NodeParameter("drain_period", 0.02, "time between two rounds of taking messages", unit="s", lower=0.001, upper=1.0),
 )

@@ -1,18 +1,19 @@
 """Stamps: the even grid that they stand for, and whether the motion follows the grid or the stamps.
 
 **The grid from the stamps alone.** Sample k is taken at t_0 + P n_k, with whole numbers n_k that grow by one but where samples
-were lost. The period P is the median of slopes over many samples, which neither jitter nor lost samples move. Where a step
+were lost. The period P is the duration over the sum of the steps, each rounded to whole usual ones. Where a step
 is longer than one and a half periods, the median lateness after it, less that before, tells how many samples were lost:
 a stamp that is late leaves what follows where it was. The line through (n_k, t_k) is the grid.
 
 **Rounded stamps** (single precision, a counter in milliseconds at 400 Hz, too few digits) are the even grid, rounded: each is
-then within one step of the rounding of it. They may repeat, and are recognised before anything asks that time grows.
+then within one step of the rounding of it. They may repeat, and are recognised before anything asks that time grows; so are
+those of a counter that starts again, after 2^n of its units or once an hour or a day.
 
 **Whose the jitter is.** With d_k = stamp - grid and the motion f, the recorded position is
 q_k = f(grid_k) + beta v_k d_k + e_k,
 where beta is 0 if the position was read evenly and only its stamp is late, and 1 if it was read when the stamp was taken.
 Fourth differences D take f away: beta = <D q, D(v d)> / <D(v d), D(v d)>. Where that is surely nearer to one, the stamps
-are right, and the signals are brought onto an even grid by a cubic; else the grid is taken.
+are right and stay; else the grid is taken.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from scipy.ndimage import median_filter
 from ..record import Array, Mask, Record
 from .resolution import step_of
 
-__all__ = ["Grid", "Jitter", "evened", "grid_of", "jitter_of", "rounded_grid"]
+__all__ = ["Grid", "Jitter", "evened", "grid_of", "jitter_of", "rounded_grid", "unwrapped_stamps"]
 
 _BASE = 64  # samples over which a slope tells the period
 _LOST = 1.5  # periods: a longer step may have lost a sample
@@ -38,7 +39,15 @@ _WANDER = 4.0  # times: by how much a grid that wanders has to follow the stamps
 _SLOW = 501  # samples over which a clock may wander
 _ROUNDED = 1.5  # steps of the rounding that stamps may lie apart about a line: one, and what the line itself is off
 _JITTERS = 1.0  # period by which rounded stamps may be late besides: more would change their order
+_EXACT = 1e-6  # of a counter's range, to which a wrap is known
 _MOST_LEVELS = 0.02  # of a period: rounding by less does nothing
+
+
+_WRAPS = (
+    *(2.0**bits * unit for bits in (8, 16, 24, 31, 32) for unit in (1.0, 1e-3, 1e-6, 1e-9)),
+    *(60.0, 3600.0, 43200.0, 86400.0),
+)
+"""After how long counters of seconds, milli-, micro- and nanoseconds start again, and clocks [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +98,12 @@ class Jitter:
 
 
 def _period(time: Array) -> float:
-    base = min(_BASE, max((time.shape[0] - 1) // 2, 1))
+    """Time between samples [s], lost ones counted: jitter makes as many steps longer as shorter, so that roundings cancel."""
+    step = np.diff(time)
+    usual = float(np.median(step))
+    if usual > 0.0:
+        return float(time[-1] - time[0]) / max(float(np.sum(np.round(step / usual))), 1.0)
+    base = min(_BASE, max(step.shape[0] // 2, 1))
     return float(np.median(time[base:] - time[:-base]) / base)
 
 
@@ -117,6 +131,25 @@ def grid_of(time: Array) -> Grid:
     if float(np.std(off)) > _WANDER * float(np.std(off - slow)) and float(np.ptp(slow)) > _HALF * slope:
         line, off = line + slow, off - slow
     return Grid(number, float(slope), line, off)
+
+
+def unwrapped_stamps(time: Array) -> tuple[Array, float, int] | None:
+    """Stamps of a counter that has started again [s], after how long it does so [s], and how often; None where it hasn't.
+
+    Args:
+        time: as recorded [s], shape ``(n,)``.
+    """
+    step = np.diff(time)
+    back = np.flatnonzero(step < 0.0)
+    if not back.size or time.shape[0] < 2 * _BESIDE[0] or back.size > step.shape[0] // _BESIDE[0]:
+        return None
+    usual = float(np.median(step))
+    fitting = [wrap for wrap in _WRAPS if np.all(np.abs(step[back] + wrap - usual) < max(2.0 * usual, _EXACT * wrap))]
+    if usual <= 0.0 or len(fitting) != 1:
+        return None
+    turns = np.zeros(time.shape[0])
+    turns[back + 1] = fitting[0]
+    return time + np.cumsum(turns), fitting[0], int(back.size)
 
 
 def rounded_grid(time: Array) -> tuple[Array, float] | None:
@@ -183,15 +216,14 @@ def _smoothed(position: Array) -> Array:
 
 
 def evened(record: Record) -> Record:
-    """``record`` with the stamps that its motion has, and a note of it where these aren't the recorded ones."""
+    """``record`` with even stamps and a note of it, unless its motion follows the recorded ones."""
     grid = grid_of(record.time)
     if grid.period <= 0.0 or float(np.max(np.abs(grid.off))) < _EVEN * grid.period or not np.all(np.diff(grid.time) > 0.0):
         return record
     found = jitter_of(record, grid)
-    about = f"stamps jitter by {1e3 * grid.spread:.3g} ms ({100.0 * grid.spread / grid.period:.2g} % of a sample)"
     if found.follows:
-        note = f"{about}, and the motion follows them: brought onto an even grid of {1.0 / grid.period:.5g} Hz by a cubic"
-        return replace(record.uniform(grid.period), notes=(*record.notes, note))
+        return record
+    about = f"stamps jitter by {1e3 * grid.spread:.3g} ms ({100.0 * grid.spread / grid.period:.2g} % of a sample)"
     why = "the motion doesn't" if np.isfinite(found.error) and found.error < _HALF else "the motion can't tell"
     note = f"{about}, {why}: taken as even at {1.0 / grid.period:.5g} Hz; stamp where the sensor is read"
     return replace(record, time=grid.time - grid.time[0], notes=(*record.notes, note))
