@@ -151,6 +151,7 @@ class Equations:
         notes: what was left out, and why.
         rests: what tells them.
         cutoff: of the filter on the position [Hz].
+        decimation: samples from row to row.
     """
 
     stretches: tuple[Stretch, ...]
@@ -165,6 +166,7 @@ class Equations:
     notes: tuple[str, ...]
     rests: Rests
     cutoff: float = 0.0
+    decimation: int = 1
 
     def rows(self, of_stretch: Callable[[Stretch], Array]) -> Array:
         """A full-rate quantity of every stretch, thinned out and joined, shape ``(n_rows, ...)``."""
@@ -206,7 +208,7 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
     given = options.rest_velocity
     noise = _unclear(stretches, cutoff) if given is None else 0.0
     speeds, steps = tuple(s.velocity for s in stretches), tuple(s.sample_time for s in stretches)
-    rests = Rests(speeds, steps, noise, edge, decimation, reach)
+    rests = Rests(speeds, steps, noise, edge, decimation, reach, cutoff < _MECHANICS)
     if given is None:
         # Below its own noise a velocity says nothing, however slow the rest of the recording is.
         slow = SLOW * float(np.quantile(np.abs(velocity), 0.98))
@@ -228,7 +230,19 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
             "strokes, or raise the cutoff"
         )
     return Equations(
-        tuple(stretches), thin, np.concatenate(force), velocity, time, starts, sliding, clear, rest, tuple(notes), rests, cutoff
+        tuple(stretches),
+        thin,
+        np.concatenate(force),
+        velocity,
+        time,
+        starts,
+        sliding,
+        clear,
+        rest,
+        tuple(notes),
+        rests,
+        cutoff,
+        decimation,
     )
 
 

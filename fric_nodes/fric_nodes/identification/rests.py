@@ -33,6 +33,7 @@ class Rests:
         edge: samples of a stretch before its first row.
         decimation: samples from row to row.
         reach: samples over which the filters of a row reach to either side.
+        rounds: True where the filter on the position is too slow for reversals: it turns them later than the axis did.
     """
 
     velocity: tuple[Array, ...]
@@ -41,11 +42,15 @@ class Rests:
     edge: int
     decimation: int
     reach: int
+    rounds: bool = False
 
     def clear(self, limit: float) -> Mask:
-        """True for each row within whose window the joint isn't slower than ``limit`` [x/s] for a while."""
+        """True for each row whose window holds no rest (slower than ``limit`` [x/s]), and no reversal where that counts.
+
+        Friction jumps at a reversal, and so does the acceleration; of the smoothed motion the velocity is zero later than that.
+        """
         parts = [
-            ~_near(at_rest(velocity, limit, step) | turns(velocity), self.reach)[
+            ~_near(at_rest(velocity, limit, step) | (turns(velocity) & self.rounds), self.reach)[
                 self.edge : velocity.shape[0] - self.edge : self.decimation
             ]
             for velocity, step in zip(self.velocity, self.sample_time, strict=True)

@@ -17,7 +17,7 @@ __all__ = ["driving_force", "force_along", "force_over_intervals", "free_run", "
 
 
 def score(model: Model, records: Sequence[Record], options: Options, found: Equations | None = None) -> Score:
-    """Score of ``model`` on ``records``: every valid sample counts but those at rest, whatever weight a fit gave it.
+    """Score of ``model`` on ``records``: every valid row counts but those that a rest reaches into, whatever its weight in a fit.
 
     At rest a static friction law leaves the force open, so that there is nothing to compare; leaving rest out for every
     structure keeps the scores of different structures comparable.
@@ -30,7 +30,7 @@ def score(model: Model, records: Sequence[Record], options: Options, found: Equa
     """
     found = equations(list(records), options) if found is None else found
 
-    use = found.sliding
+    use = found.clear
     force = driving_force(model, found)[use]
     error = force - found.rows(lambda stretch: force_along(model, stretch))[use]
     if not np.any(force):

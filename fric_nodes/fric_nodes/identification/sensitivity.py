@@ -10,7 +10,7 @@ shifts the estimate by A^-1 J' d. A, S and J' d of several recordings add up.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -124,6 +124,13 @@ class View(Protocol):
 
     def starts(self, use: Mask) -> Index:
         """First of each run of used rows of one stretch of time, among the used rows."""
+
+
+def settled(view: View, options: Options) -> Options:
+    """``options`` with the filter and the rows that ``view`` has chosen, where it has."""
+    if not isinstance(view, ForceView):
+        return options
+    return replace(options, cutoff=view.found.cutoff, decimation=view.found.decimation)
 
 
 class ForceView:

@@ -37,6 +37,7 @@ _BLOCKS = 40
 _FEWEST = 200  # samples
 _NINETY = 1.645  # standard errors
 _KNOWN = 0.25  # of a sample: half of what lies between two ways to hold a force
+_NEARLY = 0.05  # of a sample
 _ROUNDS = 3
 _MOST = 0.5  # sample either way, by how a force may be held; what is more is a delay
 _CLASSES = {"following": 0.5, "linear": 0.0, "preceding": -0.5}
@@ -66,8 +67,10 @@ class Hold:
         """``following``, ``preceding`` or ``linear`` where only one of them fits; ``between``, ``delayed`` or ``unknown``."""
         if not (np.isfinite(self.late) and self.error < _KNOWN):
             return "unknown"
-        reach = max(_NINETY * self.error, 0.2 * _KNOWN)
-        fitting = [name for name, late in _CLASSES.items() if abs(self.late - late) <= reach]
+        own = _NINETY * self.error
+        # A hold is half a sample late but for small errors of this estimate; a sampled force may be late by anything.
+        reach = {"following": max(own, _NEARLY), "preceding": max(own, _NEARLY), "linear": own}
+        fitting = [name for name, late in _CLASSES.items() if abs(self.late - late) <= reach[name]]
         if fitting:
             return fitting[0] if len(fitting) == 1 else "unknown"
         return "between" if abs(self.late) < _MOST else "delayed"
@@ -146,7 +149,9 @@ def hold_of(record: Record) -> Hold:
     if use.size < _FEWEST:
         return nothing
     ones = np.ones(even.n_samples)
-    columns = np.column_stack([a, v, v * np.abs(v), q - np.mean(q), ones, np.sign(v)])
+    # The filter lets a reversal of the friction ring on farther than the samples that are left out around it.
+    rung = _low_pass(np.sign(v), cutoff, h)
+    columns = np.column_stack([a, v, v * np.abs(v), q - np.mean(q), ones, rung])
     if np.ptp(np.sign(v[use])) == 0.0:
         columns = columns[:, :-1]
     columns = columns / np.maximum(np.sqrt(np.mean(columns[use] ** 2, axis=0)), 1e-300)

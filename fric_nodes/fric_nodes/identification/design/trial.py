@@ -24,7 +24,7 @@ from ...record import Array, Record
 from ...simulate import Simulator, substeps
 from ..free_parameters import FreeParameters
 from ..result import IdentificationError, Options
-from ..sensitivity import VIEWS, Information, information, sensitivities
+from ..sensitivity import VIEWS, Information, information, sensitivities, settled
 from .limits import Limits, Rig
 
 __all__ = [
@@ -234,7 +234,10 @@ def judged(
     random = np.random.default_rng(_SEED)
     view_of = VIEWS[predicts]
     try:
-        noisy = [view_of(model, [recorded(motion, rig, random)], options, index) for _ in range(_DRAWS)]
+        first = view_of(model, [recorded(motion, rig, random)], options, index)
+        # The same filter and rows for all of them.
+        options = settled(first, options)
+        noisy = [first, *(view_of(model, [recorded(motion, rig, random)], options, index) for _ in range(_DRAWS - 1))]
         clean = view_of(model, [recorded(motion, rig, None)], options, noisy[0].index)
     except IdentificationError:
         return None
