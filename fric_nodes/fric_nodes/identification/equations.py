@@ -188,7 +188,7 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
     rate = 1.0 / max(record.sample_time for record in records)
     even = [_even(record, notes) for record in records]
     cutoff, decimation = _filter(records[0].source, even, options, rate, model is not None and model.has_slip_dynamics)
-    edge = int(np.ceil(_EDGE_PERIODS / cutoff * rate))
+    edge = int(np.ceil(_EDGE_PERIODS / cutoff * rate - 1e-6))
     stretches = [stretch for record in even for stretch in _stretches(record, cutoff, edge, notes)]
     if not stretches:
         raise IdentificationError(

@@ -17,7 +17,7 @@ __all__ = ["driving_force", "force_along", "force_over_intervals", "free_run", "
 
 
 def score(model: Model, records: Sequence[Record], options: Options, found: Equations | None = None) -> Score:
-    """Score of ``model`` on ``records``: every valid row counts but those that a rest reaches into, whatever its weight in a fit.
+    """Score of ``model`` on ``records``: every valid row counts but those that a rest reaches into, whatever weight it had.
 
     At rest a static friction law leaves the force open, so that there is nothing to compare; leaving rest out for every
     structure keeps the scores of different structures comparable.
