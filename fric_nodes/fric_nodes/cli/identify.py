@@ -72,10 +72,10 @@ def identify(
     ] = None,
     joint: JointsOption = None,
     cutoff: Annotated[
-        float | None, typer.Option("--cutoff", help="Low-pass filter on the position [Hz]; a tenth of the rate, at most 100.")
+        float | None, typer.Option("--cutoff", help="Low-pass filter on the position [Hz]; from its noise, at most 100.")
     ] = None,
     decimation: Annotated[
-        int | None, typer.Option("--decimation", help="Keep every n-th filtered equation; rate over cutoff.")
+        int | None, typer.Option("--decimation", help="Keep every n-th filtered equation; from the noise of the position.")
     ] = None,
     rest_velocity: Annotated[
         float | None, typer.Option("--rest-velocity", help="A joint that stays slower than this rests [m/s or rad/s].")

@@ -39,7 +39,8 @@ def import_(
     The mapping names time, effort, and position or velocity; reference, normal_load, temperature and extra signals may follow.
     Only the columns that it names are judged. A signal that was sampled at other times has a time of its own, as in effort:
     {from: torque, unit: N m, time: {from: t2, unit: ms}}. Its effort_hold says when a force acts: following (a controller's
-    output, held from its stamp to the next), preceding, or linear (measured, or nothing is known; the default).
+    output, held from its stamp to the next), preceding or mean (over the sample before), linear (a continuous force), or
+    unknown (the default: fits find it from the motion).
     """
     from ..bagio.importing import import_recording
     from ..bagio.mapping import load_mapping

@@ -132,9 +132,11 @@ def foresee(
     except DesignError as error:
         raise IdentificationError(records[0].source, "the joint hardly moves", "record motion to both sides") from error
     rig = rig_of(records)
-    reached = _nearer(begun, records, options, predicts)
+    # Filter and rows as the fit has chosen them: they needn't be chosen anew for every view of the same recordings.
+    chosen = replace(options, cutoff=begun.found.cutoff, decimation=begun.found.decimation)
+    reached = _nearer(begun, records, chosen, predicts)
     problem, _ = problem_for(reached, None, records, options, limits, rig, predicts)
-    view = VIEWS[predicts](problem.model, list(records), options, problem.index)
+    view = VIEWS[predicts](problem.model, list(records), chosen, problem.index)
     use = view.rows()
     columns = sensitivities(view, problem.model, problem.free, problem.size)[use]
     assert problem.known is not None
@@ -154,7 +156,7 @@ def foresee(
         coarse = replace(problem, rig=replace(problem.rig, period=max(problem.rig.period, _COARSE)))
         trials = explored(coarse, list(EXCITATIONS.values()))
     findings = [_finding(each, problem, together, motion, trials) for each in found]
-    findings += instrument_errors(problem, view, columns, use, records, options, predicts)
+    findings += instrument_errors(problem, view, columns, use, records, chosen, predicts)
     free = problem.free
     return Foreseen(
         free.names,

@@ -77,8 +77,9 @@ class Run:
         position = self.position[first:last]
         begin = self.start
         if first > 0:
-            time = np.concatenate([[0.0], np.cumsum(self.step)])[1:]
-            begin = initial_state(time, self.position, first - 1)[:2]
+            # What follows a part is corrected at every sample: a difference will do for where it begins.
+            before = float(self.position[first - 1])
+            begin = (before, float((position[0] - before) / self.step[first]))
         load = self.load[first:last] if self.load.shape[0] > 1 else self.load
         temperature = self.temperature[first:last] if self.temperature.shape[0] > 1 else self.temperature
         return replace(

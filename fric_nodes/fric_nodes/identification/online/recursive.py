@@ -31,6 +31,7 @@ import numpy as np
 
 from ...model import Model
 from ...record import Array, Mask, Record, RecordError
+from ...signals.stamps import evened
 from ..equations import Equations, equations
 from ..free_parameters import FreeParameters
 from ..inverse_dynamics import regressors
@@ -200,8 +201,14 @@ class OnlineIdentifier:
             self.samples_rejected += after
             return False
         try:
-            record = Record(
-                time - time[0], np.array(self._position), np.array(self._effort), effort_hold="linear", source="joint states"
+            record = evened(
+                Record(
+                    time - time[0],
+                    np.array(self._position),
+                    np.array(self._effort),
+                    effort_hold="linear",
+                    source="joint states",
+                )
             )
             found = equations([record], self.options)
         except (RecordError, IdentificationError):
