@@ -25,6 +25,7 @@ from ..model import Model
 from ..record import Array, Index, Mask, Record, RecordError
 from ..signals.instrument_noise import level_of
 from ..signals.resolution import noise_of
+from .differences import differentiated, smooth_mean
 from .rests import MIN_ROWS, SLOW, Rests, at_rest, can_stand_for, velocity_noise
 from .result import IdentificationError, Options
 from .row_rate import decimation_of
@@ -35,7 +36,6 @@ FINER = 4
 """Steps per sample of the motion that friction states are led along."""
 
 _FILTER_ORDER = 4
-_EIGHTH = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)  # of differences k samples apart either way (Fornberg 1988)
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
 _WINDOW_BAND = 0.6  # of the row rate: band of white noise of as much power in the derivative
 _MARGIN = 0.25  # of the cutoff's period: how far the filter on the position carries a rest
@@ -80,7 +80,7 @@ class Stretch:
         velocity: [x/s].
         acceleration: [x/s^2].
         effort: force as recorded [F].
-        force: mean force about each sample, as of the motion, see :func:`_differentiated` [F].
+        force: mean force about each sample, as of the motion, see :mod:`.differences` [F].
         hold: how the recording holds its force.
         timing_error: standard error of when the force acts [s].
         load: relative normal load [1], one value or ``(n,)``.
@@ -104,7 +104,7 @@ class Stretch:
 
     def along(self, raw_position: Array) -> Stretch:
         """The same with another position signal [x], shape ``(n,)``."""
-        position, velocity, acceleration = _differentiated(self.smooth(raw_position), self.sample_time)
+        position, velocity, acceleration = differentiated(self.smooth(raw_position), self.sample_time)
         return replace(self, raw_position=raw_position, position=position, velocity=velocity, acceleration=acceleration)
 
     @cached_property
@@ -327,7 +327,7 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
     sample_time = record.sample_time
     raw = record.position[first:last]
     sos: Any = signal.butter(_FILTER_ORDER, 2.0 * cutoff * sample_time, output="sos")
-    position, velocity, acceleration = _differentiated(signal.sosfiltfilt(sos, raw), sample_time)
+    position, velocity, acceleration = differentiated(signal.sosfiltfilt(sos, raw), sample_time)
     effort = record.effort[first:last]
     before = np.concatenate([effort[:1], effort[:-1]])
     after = np.concatenate([effort[1:], effort[-1:]])
@@ -348,34 +348,6 @@ def _stretch(record: Record, first: int, last: int, cutoff: float) -> Stretch:
         temperature=temperature[first:last] if temperature.shape[0] > 1 else temperature,
         smooth=partial(signal.sosfiltfilt, sos),
     )
-
-
-def _differentiated(position: Array, sample_time: float) -> tuple[Array, Array, Array]:
-    """A filtered position, and its velocity and acceleration as means about each sample, falling to zero at the next ones.
-
-    With these weights the mean acceleration is the second difference of the position, exactly, whatever happens between two
-    samples, and the mean of a force that is held between them is that of the two around a sample. The velocity is taken by
-    differences of eighth order and averaged likewise, which for what is smooth is (v_before + 10 v + v_after) / 12.
-    """
-    n, reach = position.shape[0], len(_EIGHTH)
-    velocity = np.gradient(position, sample_time)
-    velocity[reach:-reach] = (
-        sum(
-            weight * (position[reach + k : n - reach + k] - position[reach - k : n - reach - k])
-            for k, weight in enumerate(_EIGHTH, 1)
-        )
-        / sample_time
-    )
-    acceleration = np.empty(n)
-    acceleration[1:-1] = np.diff(position, 2) / sample_time**2
-    acceleration[0], acceleration[-1] = acceleration[1], acceleration[-2]
-    return position, smooth_mean(velocity), acceleration
-
-
-def smooth_mean(values: Array) -> Array:
-    """Mean of a smooth signal about each sample with weights that fall to zero at the next ones, shape ``(n,)``."""
-    before, after = np.concatenate([values[:1], values[:-1]]), np.concatenate([values[1:], values[-1:]])
-    return np.asarray((before + 10.0 * values + after) / 12.0, dtype=np.float64)
 
 
 def surroundings(record: Record) -> tuple[Array, Array]:
