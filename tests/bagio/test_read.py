@@ -23,7 +23,7 @@ def test_foreign_bag_in_every_storage(write_bag: Any, joint_rows: Any, storage: 
     np.testing.assert_allclose(record.time, np.arange(100) * 1e-3, atol=1e-12)
     np.testing.assert_array_equal(record.position, np.arange(100) * 1e-3)
     np.testing.assert_array_equal(record.effort, np.arange(100) * 2.0)
-    assert (record.joint, record.effort_hold, record.units) == ("axis", "linear", Units("m", "N"))
+    assert (record.joint, record.effort_hold, record.units) == ("axis", "unknown", Units("m", "N"))
     assert record.velocity is None
     assert record.reference is None
     assert record.valid is None

@@ -60,7 +60,7 @@ def test_an_axis_that_falls_over_without_its_controller_is_identified() -> None:
         assert error < 5.0 * found.model.standard_errors[name], name
     # From the measured force alone it falls, whichever parameters it has, and the fit says that it found nothing.
     whole = FIT(pendulum(), [record], options)
-    assert "not to be relied on" in whole.status or "not converged" in whole.status
+    assert any(said in whole.status for said in ("not to be relied on", "not converged", "does not describe"))
 
 
 def axis() -> Model:

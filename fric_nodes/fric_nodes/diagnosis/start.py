@@ -13,7 +13,7 @@ import numpy as np
 
 from ..effect import Place
 from ..errors import InputError
-from ..identification import METHODS
+from ..identification import inverse_dynamics
 from ..identification.result import IdentificationError, Options
 from ..model import Model, build_model
 from ..plants import PLANTS
@@ -42,6 +42,8 @@ FAST = 1.0
 """Largest product of bandwidth and sample time."""
 FIRST_FIT = 6
 """Iterations, by which starts are compared."""
+_SURE = 1.96  # standard errors, 95 %
+_NEXT_TO_NOTHING = 1e-3  # of an inertia, where all of it may be chance
 _LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of the physics
 _EXPLAINED = 0.02  # of the force: a plant that leaves less of it may be the one recorded
 _FAR_BETTER = 0.25  # of what the given plant leaves: where a mass with the same terms leaves less, it is another plant
@@ -79,9 +81,16 @@ def started(nominal: Model, train: Sequence[Record], as_given: bool = False) -> 
 def _by_inverse_dynamics(model: Model, train: Sequence[Record]) -> Model | None:
     """``model`` fitted to ``train`` by inverse dynamics, or None where these don't tell its values."""
     try:
-        found = METHODS["inverse-dynamics"].fit(model, list(train), Options()).model
+        # Without its verdict: that an inertia comes out at nothing is what is asked.
+        fitted = inverse_dynamics.fit_force(model, list(train), Options())
     except (IdentificationError, np.linalg.LinAlgError):
         return None
+    found = fitted.model
+    # Of an inertia that hardly shows no more is taken than is sure.
+    for name, variance in zip(fitted.free.names, np.diag(fitted.covariance), strict=True):
+        value, reach = found.value(name), _SURE * float(np.sqrt(max(variance, 0.0)))
+        if name == "mass" and reach >= value:
+            found = found.with_value(name, max(_NEXT_TO_NOTHING * value, value - reach))
     return found if np.all(np.isfinite(found.values)) else None
 
 

@@ -58,7 +58,8 @@ def concluded(method: str, fitted: Fitted, records: Sequence[Record], options: O
     train = score(model, records, options, None if model.has_slip_dynamics else fitted.found)
     source = ", ".join(record.source for record in records)
     if not trouble:
-        refuse_undetermined(model, fitted.free, fitted.covariance, fitted.found, train, source)
+        by_force = method == "inverse-dynamics"
+        refuse_undetermined(model, fitted.free, fitted.covariance, fitted.found, train, source, by_force)
     wrong = misfit(model, fitted.found, train)
     return Identification(
         model=model,

@@ -38,6 +38,7 @@ FINER = 4
 _FILTER_ORDER = 4
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
 _WINDOW_BAND = 0.6  # of the row rate: band of white noise of as much power in the derivative
+_AT_TURNS = 0.1  # of the acceleration's energy: what is left when a tenth of the information about the inertia is
 _MARGIN = 0.25  # of the cutoff's period: how far the filter on the position carries a rest
 _HIGHEST = 0.36  # of the sampling rate: above it a filter and differences of samples no longer go together
 _MECHANICS = 100.0  # [Hz], the published choice for positioning axes
@@ -223,6 +224,13 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
             f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) don't count for sliding friction"
         )
     clear = sliding & rests.clear(still)
+    if rests.rounds:
+        turning = replace(rests, rounds=False)
+        with_turns = sliding & turning.clear(still)
+        square = np.concatenate([thin(stretch, stretch.acceleration) for stretch in stretches]) ** 2
+        if np.sum(square[clear]) < _AT_TURNS * np.sum(square[with_turns]):
+            # Strokes at constant speed show their inertia at the reversals only.
+            rests, clear = turning, with_turns
     if not can_stand_for(clear, sliding, velocity):
         clear = sliding
         notes.append(

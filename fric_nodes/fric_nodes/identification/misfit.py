@@ -52,7 +52,7 @@ _SEEN = 2.0  # standard errors
 
 
 def refuse_undetermined(
-    model: Model, free: FreeParameters, covariance: Array, found: Equations, scored: Score, source: str
+    model: Model, free: FreeParameters, covariance: Array, found: Equations, scored: Score, source: str, by_force: bool
 ) -> None:
     """Refuse a fit that has found nothing.
 
@@ -63,11 +63,13 @@ def refuse_undetermined(
         found: the equations that were fitted.
         scored: of the model on them.
         source: the recordings, for the message.
+        by_force: True where these equations are what the method fits; of an axis that its controller has to hold up they say
+            little.
 
     Raises:
         IdentificationError: the model explains no more of the force than a constant, or an inertia went to zero.
     """
-    if scored.relative_force_error_percent > _HALF and not _more_than_constant(model, free, found, scored):
+    if by_force and scored.relative_force_error_percent > _HALF and not _more_than_constant(model, free, found, scored):
         raise IdentificationError(
             source,
             f"the model explains no more of the force than a constant does (NOE {scored.noe:.4g} %): this force does not move "

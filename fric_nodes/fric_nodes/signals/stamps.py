@@ -38,16 +38,16 @@ _HALF = 0.5
 _WANDER = 4.0  # times: by how much a grid that wanders has to follow the stamps better than a straight one does
 _SLOW = 501  # samples over which a clock may wander
 _ROUNDED = 1.5  # steps of the rounding that stamps may lie apart about a line: one, and what the line itself is off
-_JITTERS = 1.0  # period by which rounded stamps may be late besides: more would change their order
+_REGULAR = 2.0  # samples by which the distances of the rarer steps of rounded stamps may differ: one, and the clock's own error
 _EXACT = 1e-6  # of a counter's range, to which a wrap is known
 _MOST_LEVELS = 0.02  # of a period: rounding by less does nothing
 
 
 _WRAPS = (
-    *(2.0**bits * unit for bits in (8, 16, 24, 31, 32) for unit in (1.0, 1e-3, 1e-6, 1e-9)),
+    *(2.0**bits * unit for bits in (16, 24, 31, 32) for unit in (1e-3, 1e-6, 1e-9) if 2.0**bits * unit > 1.0),
     *(60.0, 3600.0, 43200.0, 86400.0),
 )
-"""After how long counters of seconds, milli-, micro- and nanoseconds start again, and clocks [s]."""
+"""After how long counters of milli-, micro- and nanoseconds start again, and clocks [s]; within a second none is meant to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +170,13 @@ def rounded_grid(time: Array) -> tuple[Array, float] | None:
     period, start = (float(value) for value in np.polyfit(every, time, 1))
     if period <= 0.0 or quantum < _MOST_LEVELS * period or float(np.max(np.abs(step - period))) < _EVEN * period:
         return None
-    # A lost sample or a stall shows as a step of the lateness about the line, which rounding can't make.
-    if float(np.ptp(time - start - period * every)) > _ROUNDED * quantum + _JITTERS * period:
+    # Rounding gives steps of two sizes only, and spreads the rarer one as evenly as whole numbers allow.
+    counts = np.round(step / quantum)
+    longer = counts > np.floor(period / quantum)
+    rare = np.flatnonzero(longer if np.mean(longer) < _HALF else ~longer)
+    if float(np.ptp(counts)) > 1.0 or rare.size < _BESIDE[0] or float(np.ptp(np.diff(rare))) > _REGULAR:
+        return None
+    if float(np.ptp(time - start - period * every)) > _ROUNDED * quantum:
         return None
     return start + period * every, quantum
 
