@@ -208,7 +208,8 @@ def test_an_axis_that_runs_away_is_cut_with_one_message(graph: Graph) -> None:
     graph.until(lambda: node.done, "the experiment ends", 240.0)
     messages = json.loads((out / "experiment.json").read_text())["messages"]
     assert sum("the force is cut" in message for message in messages) == 1
-    beyond = [force for where, force in sent if where > 2.0]
+    # One state may be under way while the first beyond the limit is answered.
+    beyond = [force for where, force in sent if where > 2.03]
     assert beyond
     assert set(beyond) == {0.0}
 
