@@ -89,10 +89,11 @@ def test_rests_between_strokes_leave_no_trace_in_the_values(slider: Any) -> None
 
 
 def test_rows_that_a_rest_reaches_into_are_told_from_the_others() -> None:
-    # Uniform motion, a rest of 0.2 s, and back: known to the sample.
+    # There, a rest of 0.2 s, and back: known to the sample. It accelerates between its reversals too.
     h, speed = 1e-3, 0.1
     velocity = np.concatenate([np.full(2000, speed), np.zeros(200), np.full(2000, -speed), np.full(1000, speed)])
     time = h * np.arange(velocity.shape[0])
+    velocity *= 1.0 + 0.5 * np.sin(2.0 * np.pi * 3.0 * time)
     found = equations([Record(time, h * np.cumsum(velocity), np.sign(velocity))], Options(cutoff=50.0))
     rested = (found.time > 1.995) & (found.time < 2.205)
     assert not np.any(found.clear[rested])

@@ -38,7 +38,8 @@ def test_a_sampled_continuous_force_is_linear() -> None:
     force = 2.0 * acceleration + 5.0 * np.sign(velocity) + 12.0 * velocity + noise
     record = Record(time, position + 1e-7 * np.random.default_rng(2).standard_normal(time.size), force, effort_hold="unknown")
     found = hold_of(record)
-    assert found.kind == "linear"
+    assert abs(found.late) < max(3.0 * found.error, 0.05)
+    assert found.kind in {"linear", "between"}, "a sampled force may be late by anything"
     assert resolved(record).effort_hold == "linear"
 
 
