@@ -27,8 +27,11 @@ setup(
     license=MANIFEST.findtext("license"),
     maintainer=MANIFEST.findtext("maintainer"),
     maintainer_email=MANIFEST.find("maintainer").get("email"),
-    packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", *(f"**/*.{kind}" for kind in ("html", "css", "js", "json", "svg", "yaml", "c", "h"))]},
+    packages=find_packages(include=["fric", "fric.*", NAME, f"{NAME}.*"]),
+    package_data={
+        "fric": ["py.typed", *(f"**/*.{kind}" for kind in ("html", "css", "js", "json", "svg", "yaml", "c", "h"))],
+        NAME: ["py.typed"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", from_here([HERE / "resource" / NAME])),
         (f"share/{NAME}", from_here([HERE / "package.xml"])),
@@ -39,5 +42,6 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [f"{node} = {NAME}.nodes.{node}:main" for node in NODES] + ["fric = fric_nodes.cli.main:main"],
+        "fric.plugins": ["fric_nodes = fric_nodes.bench"],
     },
 )

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pickle
 
 import pytest
-from fric_nodes.control.pid import PidError
-from fric_nodes.diagnosis import DiagnosisError
-from fric_nodes.errors import InputError
-from fric_nodes.model import ModelError
+from fric.control.pid import PidError
+from fric.diagnosis import DiagnosisError
+from fric.errors import InputError
+from fric.model import ModelError
 
 
 @pytest.mark.parametrize("kind", [InputError, ModelError, DiagnosisError, PidError])

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.errors import InputError
-from fric_nodes.threads import alone, linear_algebra_in_one, mapped, n_threads
+from fric.errors import InputError
+from fric.threads import alone, linear_algebra_in_one, mapped, n_threads
 from threadpoolctl import threadpool_info
 
 
@@ -63,7 +63,7 @@ def test_a_process_among_others_uses_one_thread() -> None:
 _PARENT = """
 import multiprocessing, os, sys, time
 from concurrent.futures import ProcessPoolExecutor
-from fric_nodes.threads import alone
+from fric.threads import alone
 
 if __name__ == "__main__":
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn"), initializer=alone) as pool:

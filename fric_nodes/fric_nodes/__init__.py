@@ -1,8 +1,7 @@
-"""Friction of mechanical axes: recorded, identified, compensated and diagnosed, over ROS 2 and offline.
-
-The package imports no ROS outside `fric_nodes.nodes`; everything else works on arrays, files and recordings.
-"""
+"""The ROS 2 shell of the library :mod:`fric`: its nodes, and the command ``fric``."""
 
 from __future__ import annotations
 
-__version__ = "0.1.0"
+from fric import __version__
+
+__all__ = ["__version__"]

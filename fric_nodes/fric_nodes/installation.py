@@ -50,7 +50,7 @@ def _guarded(look: Callable[[], Item]) -> Item:
 
 
 def _versions() -> Item:
-    from . import __version__
+    from fric import __version__
 
     parts = [f"fric {__version__}", f"Python {platform.python_version()}"]
     missing = []
@@ -65,7 +65,7 @@ def _versions() -> Item:
 
 
 def _cache() -> Item:
-    from .engine.compile import _cache_folder as cache_folder
+    from fric.engine.compile import _cache_folder as cache_folder
 
     folder = cache_folder()
     if folder.name.startswith("fric-"):
@@ -79,9 +79,8 @@ def _cache() -> Item:
 
 def _compiler() -> Item:
     import numpy as np
-
-    from .model import build_model, term
-    from .simulate import simulate
+    from fric.model import build_model, term
+    from fric.simulate import simulate
 
     started = time.perf_counter()
     model = build_model("rigid", {"mass": 2.0}, [term("viscous", coefficient=4.0)])
@@ -96,8 +95,8 @@ def _compiler() -> Item:
 
 
 def _configuration() -> Item:
-    from .model_file import read_model
-    from .shared_files import config_file
+    from fric.model_file import read_model
+    from fric.shared_files import config_file
 
     path = config_file("demo_axis.yaml")
     read_model(path)

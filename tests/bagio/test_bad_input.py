@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import BagError, read_record
-from fric_nodes.errors import InputError
-from fric_nodes.record import Record
+from fric.bagio import BagError, read_record
+from fric.errors import InputError
+from fric.record import Record
 
 START = 1_700_000_000_000_000_000
 MS = 1_000_000

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio.decode import Block, DecodeError, decode
-from fric_nodes.bagio.encode import float64_messages, joint_state_messages, reference_messages, stamped_force_messages
+from fric.bagio.decode import Block, DecodeError, decode
+from fric.bagio.encode import float64_messages, joint_state_messages, reference_messages, stamped_force_messages
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 

@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from fric_nodes.bagio import BagError, ImportingError, import_recording, load_mapping, read_record, write_record
-from fric_nodes.importers.units import unit
-from fric_nodes.record import Record, Units
+from fric.bagio import BagError, ImportingError, import_recording, load_mapping, read_record, write_record
+from fric.importers.units import unit
+from fric.record import Record, Units
 from scipy.io import savemat
 
 N = 50

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import read_record, read_series
-from fric_nodes.record import Units
+from fric.bagio import read_record, read_series
+from fric.record import Units
 
 RECORDER = """
 import sys, time
 import numpy as np
-from fric_nodes.bagio import BagWriter
-from fric_nodes.bagio.encode import joint_state_messages
+from fric.bagio import BagWriter
+from fric.bagio.encode import joint_state_messages
 
 metadata = {"fric.position_unit": "rad", "fric.force_unit": "N m", "fric.effort_hold": "preceding"}
 with BagWriter(sys.argv[1], storage=sys.argv[2], compression=sys.argv[3], metadata=metadata) as bag:

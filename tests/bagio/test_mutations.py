@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import Topics, read_record
-from fric_nodes.errors import InputError
+from fric.bagio import Topics, read_record
+from fric.errors import InputError
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer

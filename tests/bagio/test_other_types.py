@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import BagError, Topics, read_record
-from fric_nodes.bagio.read import joint_list
+from fric.bagio import BagError, Topics, read_record
+from fric.bagio.read import joint_list
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import struct
 
 import pytest
-from fric_nodes.bagio.padding import PaddingEraser
-from fric_nodes.bagio.types import JOINT_STATE, type_fields, typestore
+from fric.bagio.padding import PaddingEraser
+from fric.bagio.types import JOINT_STATE, type_fields, typestore
 
 
 def joint_state(padding: bytes, *, names: tuple[str, ...] = ("axis",), velocity: bool = True, order: str = "<") -> bytes:

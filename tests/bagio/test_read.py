@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import BagError, Topics, bag_info, iterate_raw, read_record, read_series
-from fric_nodes.record import Units
+from fric.bagio import BagError, Topics, bag_info, iterate_raw, read_record, read_series
+from fric.record import Units
 
 START = 1_700_000_000_000_000_000
 MS = 1_000_000

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import BagError, import_recording, read_record, write_record
+from fric.bagio import BagError, import_recording, read_record, write_record
 from scipy.io import loadmat
 
 pytestmark = pytest.mark.real_data

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import BagError, Topics, bag_info, read_record, read_series
-from fric_nodes.bagio.blocks import unpacked
+from fric.bagio import BagError, Topics, bag_info, read_record, read_series
+from fric.bagio.blocks import unpacked
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 

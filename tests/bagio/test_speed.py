@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import BagWriter, read_record
-from fric_nodes.bagio.encode import float64_messages, joint_state_messages, stamped_force_messages
+from fric.bagio import BagWriter, read_record
+from fric.bagio.encode import float64_messages, joint_state_messages, stamped_force_messages
 
 pytestmark = pytest.mark.alone
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fric_nodes.bagio import WriteError
-from fric_nodes.bagio.types import DEFINITIONS, definition, type_fields
+from fric.bagio import WriteError
+from fric.bagio.types import DEFINITIONS, definition, type_fields
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 from rosbags.typesys import get_types_from_msg
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import BagError, BagWriter, WriteError, bag_info, iterate_raw, read_record, read_series, write_record
-from fric_nodes.bagio import write as write_module
-from fric_nodes.record import Record, Units
+from fric.bagio import BagError, BagWriter, WriteError, bag_info, iterate_raw, read_record, read_series, write_record
+from fric.bagio import write as write_module
+from fric.record import Record, Units
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 

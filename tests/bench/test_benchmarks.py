@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bench import BENCHMARKS, Benchmark
-from fric_nodes.bench.benchmark import Figure
-from fric_nodes.bench.by_scipy import fit_by_scipy
+from fric.bench import BENCHMARKS, Benchmark
+from fric.bench.benchmark import Figure
+from fric.bench.by_scipy import fit_by_scipy
+from fric.record import Record
 from fric_nodes.cli import bench
-from fric_nodes.record import Record
 from typer import Typer
 from typer.testing import CliRunner
 
@@ -31,7 +31,7 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return Benchmark(name, name, lambda: (names.append(name), [Figure(name, 1.0, "s", "<= 2")])[1], long)
 
     fakes = {name: made(name, name == "slow") for name in ("quick", "slow")}
-    monkeypatch.setattr("fric_nodes.bench.BENCHMARKS", fakes)
+    monkeypatch.setattr("fric.bench.BENCHMARKS", fakes)
     return names
 
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.bench.dirt import CASES, figures
-from fric_nodes.bench.dirty_axis import Axis, Dirt, drawn, recorded
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.record import Record, Units
-from fric_nodes.signals.conditioning import conditioned
+from fric.bench.benchmarks.dirt import CASES, figures
+from fric.bench.dirty_axis import Axis, Dirt, drawn, recorded
+from fric.identification import METHODS
+from fric.identification.result import Options
+from fric.identification.start import start_model
+from fric.record import Record, Units
+from fric.signals.conditioning import conditioned
 from scipy.integrate import solve_ivp
 
 AXIS = Axis(2.0, 5.0, 12.0, 0.0)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bench import laws
-from fric_nodes.bench.compiled_c import FOLDER, compile_loop, compiler
-from fric_nodes.errors import InputError
-from fric_nodes.model import term
+from fric.bench.benchmarks import laws
+from fric.bench.compiled_c import FOLDER, compile_loop, compiler
+from fric.errors import InputError
+from fric.model import term
 
 BY_LAW = {case.law: replace(case, n_steps=3000) for case in laws.CASES}
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio.write import write_record
+from fric.bagio.write import write_record
+from fric.model import build_model, term
+from fric.model_file import write_model
+from fric.record import Record
 from fric_nodes.installation import round_trip_item
-from fric_nodes.model import build_model, term
-from fric_nodes.model_file import write_model
-from fric_nodes.record import Record
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 

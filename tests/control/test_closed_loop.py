@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio.write import write_record
+from fric.bagio.write import write_record
+from fric.control.closed_loop import ClosedLoopError, closed_loop
+from fric.control.controller_file import ControllerError, read_controller
+from fric.model import Model, build_model, term
+from fric.model_file import write_model
+from fric.record import Record, Units
 from fric_nodes.cli.main import build_app
-from fric_nodes.control.closed_loop import ClosedLoopError, closed_loop
-from fric_nodes.control.controller_file import ControllerError, read_controller
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.model_file import write_model
-from fric_nodes.record import Record, Units
 from numpy.typing import NDArray
 from typer.testing import CliRunner
 

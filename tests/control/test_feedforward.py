@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.control.feedforward import Feedforward, FeedforwardError
-from fric_nodes.model import Model, build_model, term
+from fric.control.feedforward import Feedforward, FeedforwardError
+from fric.model import Model, build_model, term
 
 H = 0.002
 COULOMB = build_model("rigid", {"mass": 2.0}, [term("coulomb", force=10.0), term("viscous", coefficient=30.0)])

@@ -6,7 +6,7 @@ import itertools
 import math
 
 import pytest
-from fric_nodes.control.pid import Pid, PidError, PidGains
+from fric.control.pid import Pid, PidError, PidGains
 
 H = 0.002
 

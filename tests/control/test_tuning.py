@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.control.pid import Pid, PidGains
-from fric_nodes.control.tuning import TuningError, loop_margins, tune
+from fric.control.pid import Pid, PidGains
+from fric.control.tuning import TuningError, loop_margins, tune
 
 MASS, DAMPING, H = 2.0, 35.0, 0.002
 FINE = 20  # steps of the mass per sample

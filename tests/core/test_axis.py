@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.axis import SimulatedAxis
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.plants import PLANTS
-from fric_nodes.simulate import Simulator
+from fric.axis import SimulatedAxis
+from fric.model import Model, build_model, term
+from fric.plants import PLANTS
+from fric.simulate import Simulator
 
 FREE = build_model("rigid", {"mass": 2.0}, [])
 
@@ -98,8 +98,8 @@ def test_effort_is_what_comes_out_of_the_command_path() -> None:
 
 
 def _quarter_car() -> Model:
-    from fric_nodes.model_file import read_model
-    from fric_nodes.shared_files import config_file
+    from fric.model_file import read_model
+    from fric.shared_files import config_file
 
     return read_model(config_file("quarter_car_conventional.yaml"))
 

@@ -8,14 +8,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from fric_nodes.engine.compile import loops_for
-from fric_nodes.model import Model, build_model, term
+from fric.engine.compile import loops_for
+from fric.model import Model, build_model, term
 
 SCRIPT = """
 import sys, time
 import numpy as np
-from fric_nodes.model import build_model, term
-from fric_nodes.simulate import predict_force, simulate
+from fric.model import build_model, term
+from fric.simulate import predict_force, simulate
 model = build_model("rigid", {"mass": 1.2}, [term("coulomb", force=4.0)])
 start = time.perf_counter()
 motion = simulate(model, np.full(100, 9.0), 1e-3)

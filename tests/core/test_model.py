@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from fric_nodes.model import ModelError, Term, build_model, term
-from fric_nodes.parameter import Parameter, unit_text
-from fric_nodes.record import Units
+from fric.model import ModelError, Term, build_model, term
+from fric.parameter import Parameter, unit_text
+from fric.record import Units
 
 
 def test_terms_stand_in_the_order_of_assembly_whatever_the_order_given() -> None:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.errors import InputError
-from fric_nodes.model import Model, ModelError, build_model, term
-from fric_nodes.model_file import json_schema, model_from_text, model_to_text, read_model, write_model
-from fric_nodes.record import Units
+from fric.errors import InputError
+from fric.model import Model, ModelError, build_model, term
+from fric.model_file import json_schema, model_from_text, model_to_text, read_model, write_model
+from fric.record import Units
 from ruamel.yaml import YAML
 
 GOOD = """\

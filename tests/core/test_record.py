@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.record import Record, RecordError
+from fric.record import Record, RecordError
 
 
 def record(**changes: object) -> Record:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.model import build_model, term
-from fric_nodes.parameter import Parameter
-from fric_nodes.registry import discover
-from fric_nodes.simulate import Simulator, intervals, simulate, substeps
+from fric.model import build_model, term
+from fric.parameter import Parameter
+from fric.registry import discover
+from fric.simulate import Simulator, intervals, simulate, substeps
 
 
 def test_a_recorded_force_acts_before_after_or_around_its_stamp() -> None:
@@ -56,7 +56,7 @@ def test_a_catalogue_is_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     package = tmp_path / "some_catalogue"
     package.mkdir()
     (package / "__init__.py").write_text("", encoding="utf-8")
-    declared = "from fric_nodes.parameter import Parameter\nONE = Parameter('{0}', '{0}', '1', 'a test')\n"
+    declared = "from fric.parameter import Parameter\nONE = Parameter('{0}', '{0}', '1', 'a test')\n"
     for name in ("zebra", "ant"):
         (package / f"{name}.py").write_text(declared.format(name), encoding="utf-8")
     (package / "helper.py").write_text("NOT_ONE = 3\n", encoding="utf-8")

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fric.record import Record, RecordError, Units
 from fric_nodes.demo.graph import Graph, GraphError, NodeSetup
 from fric_nodes.demo.outcome import read_run
-from fric_nodes.record import Record, RecordError, Units
 from ruamel.yaml import YAML
 
 
@@ -27,7 +27,7 @@ def test_a_node_that_fails_ends_the_run_with_its_last_words(tmp_path: Path) -> N
 
 
 def test_a_run_is_measured_against_its_reference(tmp_path: Path) -> None:
-    from fric_nodes.bagio.write import write_record
+    from fric.bagio.write import write_record
 
     time = np.arange(0.0, 5.0, 0.002)
     reference = 0.01 * np.sin(time)
@@ -39,7 +39,7 @@ def test_a_run_is_measured_against_its_reference(tmp_path: Path) -> None:
 
 
 def test_a_run_without_reference_is_refused(tmp_path: Path) -> None:
-    from fric_nodes.bagio.write import write_record
+    from fric.bagio.write import write_record
 
     time = np.arange(0.0, 1.0, 0.002)
     write_record(Record(time, np.sin(time), np.cos(time)), tmp_path / "bag")
@@ -48,9 +48,9 @@ def test_a_run_without_reference_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_motions_end_within_the_time_given_to_them() -> None:
+    from fric.excitation import EXCITATIONS
+    from fric.shared_files import config_file
     from fric_nodes.demo.run import _MOTIONS
-    from fric_nodes.excitation import EXCITATIONS
-    from fric_nodes.shared_files import config_file
 
     for name, given in _MOTIONS.items():
         values = YAML(typ="safe").load(config_file(f"{name}.yaml"))["/**"]["ros__parameters"]

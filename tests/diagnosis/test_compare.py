@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import write_record
+from fric.bagio import write_record
+from fric.diagnosis.compare import CompareError, compare
+from fric.errors import InputError
+from fric.record import Array, Record, Units
 from fric_nodes.cli.main import build_app
-from fric_nodes.diagnosis.compare import CompareError, compare
-from fric_nodes.errors import InputError
-from fric_nodes.record import Array, Record, Units
 from typer.testing import CliRunner
 
 OFFSET, RATIO = 0.371234, 1.0003

@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.component import Signature, agreed, signatures
-from fric_nodes.diagnosis.fitting import refit
-from fric_nodes.diagnosis.track import Track
-from fric_nodes.model import build_model, term
-from fric_nodes.record import Record
+from fric.diagnosis.component import Signature, agreed, signatures
+from fric.diagnosis.fitting import refit
+from fric.diagnosis.track import Track
+from fric.model import build_model, term
+from fric.record import Record
 
 _STEP, _FINER = 2e-3, 8
 _MASS, _LEVEL, _VISCOUS = 2.0, 5.0, 12.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.confidence import confidence_of, is_doubtful, unknown_confidence
-from fric_nodes.diagnosis.settle import Step
+from fric.diagnosis.confidence import confidence_of, is_doubtful, unknown_confidence
+from fric.diagnosis.settle import Step
 
 
 def came(after: float = 2.0) -> Step:

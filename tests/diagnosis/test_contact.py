@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import write_record
+from fric.bagio import write_record
+from fric.diagnosis import DiagnosisError, diagnose
+from fric.diagnosis.blocks import in_blocks
+from fric.diagnosis.candidates import scales_of
+from fric.diagnosis.other_laws import laws_beside
+from fric.diagnosis.track import Track
+from fric.errors import InputError
+from fric.model import Model, build_model, term
+from fric.model_file import read_model, write_model
+from fric.record import Record, RecordError
 from fric_nodes.cli.main import build_app
-from fric_nodes.diagnosis import DiagnosisError, diagnose
-from fric_nodes.diagnosis.blocks import in_blocks
-from fric_nodes.diagnosis.candidates import scales_of
-from fric_nodes.diagnosis.other_laws import laws_beside
-from fric_nodes.diagnosis.track import Track
-from fric_nodes.errors import InputError
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.model_file import read_model, write_model
-from fric_nodes.record import Record, RecordError
 from typer.testing import CliRunner
 
 LEVEL, STIFFNESS, VISCOUS, OFFSET = 2.4, 4e4, 80.0, 0.1

@@ -8,16 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis import Diagnosis, DiagnosisError, diagnose
-from fric_nodes.diagnosis.fitting import State, refit
-from fric_nodes.diagnosis.grow import Growth, without_nothings
-from fric_nodes.diagnosis.held_back import only_there
-from fric_nodes.diagnosis.prove import draw
-from fric_nodes.diagnosis.settle import Step
-from fric_nodes.diagnosis.track import Track
-from fric_nodes.model import build_model, term
-from fric_nodes.model_file import model_from_text, model_to_text
-from fric_nodes.report.diagnosis import diagnosis_report
+from fric.diagnosis import Diagnosis, DiagnosisError, diagnose
+from fric.diagnosis.fitting import State, refit
+from fric.diagnosis.grow import Growth, without_nothings
+from fric.diagnosis.held_back import only_there
+from fric.diagnosis.prove import draw
+from fric.diagnosis.settle import Step
+from fric.diagnosis.track import Track
+from fric.model import build_model, term
+from fric.model_file import model_from_text, model_to_text
+from fric.report.diagnosis import diagnosis_report
 
 pytestmark = pytest.mark.timeout(600)  # the first of them compiles what all share
 

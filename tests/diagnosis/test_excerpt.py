@@ -6,11 +6,11 @@ import itertools
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.excerpt import excerpt
-from fric_nodes.diagnosis.track import Track
-from fric_nodes.model import Term, build_model, term
-from fric_nodes.record import Record
-from fric_nodes.simulate import simulate
+from fric.diagnosis.excerpt import excerpt
+from fric.diagnosis.track import Track
+from fric.model import Term, build_model, term
+from fric.record import Record
+from fric.simulate import simulate
 
 H, N = 0.001, 60_000
 MASS, COULOMB = 2.0, 4.0

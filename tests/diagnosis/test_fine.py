@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis import diagnose
-from fric_nodes.diagnosis.fine import fine_periods
-from fric_nodes.model import build_model, term
-from fric_nodes.record import Record
-from fric_nodes.simulate import simulate
+from fric.diagnosis import diagnose
+from fric.diagnosis.fine import fine_periods
+from fric.model import build_model, term
+from fric.record import Record
+from fric.simulate import simulate
 
 PITCH = 2.5e-3
 H = 1e-3

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.fitting import free_names, refit, unseen, without_term
-from fric_nodes.diagnosis.grow import Growth, helped
-from fric_nodes.diagnosis.track import Track
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.record import Record
-from fric_nodes.simulate import simulate
+from fric.diagnosis.fitting import free_names, refit, unseen, without_term
+from fric.diagnosis.grow import Growth, helped
+from fric.diagnosis.track import Track
+from fric.model import Model, build_model, term
+from fric.record import Record
+from fric.simulate import simulate
 
 H = 1e-3
 TRUTH = build_model("rigid", {"mass": 60.0}, [term("coulomb", force=20.0), term("viscous", coefficient=120.0)])

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis import Diagnosis, diagnose
-from fric_nodes.diagnosis.blocks import in_blocks
-from fric_nodes.diagnosis.ladder import ladder_of
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.model_file import model_from_text, model_to_text
-from fric_nodes.record import Array, Record
-from fric_nodes.report.diagnosis import diagnosis_report
+from fric.diagnosis import Diagnosis, diagnose
+from fric.diagnosis.blocks import in_blocks
+from fric.diagnosis.ladder import ladder_of
+from fric.model import Model, Term, build_model, term
+from fric.model_file import model_from_text, model_to_text
+from fric.record import Array, Record
+from fric.report.diagnosis import diagnosis_report
 
 SPEEDS = np.geomspace(0.005, 0.3, 16)  # [m/s]
 Law = Callable[[float], float]

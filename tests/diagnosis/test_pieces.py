@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.pieces import amplitudes_of, in_pieces, partition
+from fric.diagnosis.pieces import amplitudes_of, in_pieces, partition
 
 
 def _cost(signal: np.ndarray, target: np.ndarray, edges: tuple[int, ...], price: float) -> float:

@@ -6,15 +6,15 @@ import json
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.prove.cases import KINDS, VARIANTS, Case, Order, draw, make, plan
-from fric_nodes.diagnosis.prove.concealed import CONCEALED, clash
-from fric_nodes.diagnosis.prove.outside import OUTSIDE
-from fric_nodes.effects import EFFECTS
-from fric_nodes.errors import InputError
-from fric_nodes.identification.equations import equations
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.scoring import driving_force, force_along
-from fric_nodes.model_file import model_from_text
+from fric.diagnosis.prove.cases import KINDS, VARIANTS, Case, Order, draw, make, plan
+from fric.diagnosis.prove.concealed import CONCEALED, clash
+from fric.diagnosis.prove.outside import OUTSIDE
+from fric.effects import EFFECTS
+from fric.errors import InputError
+from fric.identification.equations import equations
+from fric.identification.result import Options
+from fric.identification.scoring import driving_force, force_along
+from fric.model_file import model_from_text
 
 _COMPONENTS = {"command path", "transmission", "guideway friction", "load", "sensor"}
 

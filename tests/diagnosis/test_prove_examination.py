@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from fric_nodes.diagnosis.prove.examination import hold
-from fric_nodes.diagnosis.prove.sealing import open_key
-from fric_nodes.errors import InputError
-from fric_nodes.report.prove import prove_page
+from fric.diagnosis.prove.examination import hold
+from fric.diagnosis.prove.sealing import open_key
+from fric.errors import InputError
+from fric.report.prove import prove_page
 
 _STUB = """
 class Found:

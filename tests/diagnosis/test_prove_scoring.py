@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.prove.scoring import (
+from fric.diagnosis.prove.scoring import (
     Found,
     Outcome,
     Rate,

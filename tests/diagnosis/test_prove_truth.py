@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.prove.physics import Physics
-from fric_nodes.diagnosis.prove.truth import Course, Loop, Run, integrate
+from fric.diagnosis.prove.physics import Physics
+from fric.diagnosis.prove.truth import Course, Loop, Run, integrate
 
 _H = 1e-3
 

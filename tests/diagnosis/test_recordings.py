@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio.importing import import_recording
-from fric_nodes.diagnosis import Diagnosis, diagnose
-from fric_nodes.diagnosis.blocks import in_blocks
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.model_file import read_model
-from fric_nodes.record import Record, Units
+from fric.bagio.importing import import_recording
+from fric.diagnosis import Diagnosis, diagnose
+from fric.diagnosis.blocks import in_blocks
+from fric.model import Model, build_model, term
+from fric.model_file import read_model
+from fric.record import Record, Units
 from scipy.io import loadmat
 
 pytestmark = pytest.mark.real_data

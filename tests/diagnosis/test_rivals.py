@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.along import Along
-from fric_nodes.diagnosis.candidates import candidates, scales_of
-from fric_nodes.diagnosis.fitting import refit, with_room
-from fric_nodes.diagnosis.other_laws import laws_further, strained, told
-from fric_nodes.diagnosis.result import listed
-from fric_nodes.diagnosis.rivals import FAR_OFF, implausible, mass_off
-from fric_nodes.diagnosis.screen import Promise, screen
-from fric_nodes.diagnosis.track import Track
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.record import Record
+from fric.diagnosis.along import Along
+from fric.diagnosis.candidates import candidates, scales_of
+from fric.diagnosis.fitting import refit, with_room
+from fric.diagnosis.other_laws import laws_further, strained, told
+from fric.diagnosis.result import listed
+from fric.diagnosis.rivals import FAR_OFF, implausible, mass_off
+from fric.diagnosis.screen import Promise, screen
+from fric.diagnosis.track import Track
+from fric.model import Model, Term, build_model, term
+from fric.record import Record
 from scipy.integrate import solve_ivp
 
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis import diagnose
-from fric_nodes.diagnosis.prove import draw
-from fric_nodes.diagnosis.start import lateness
-from fric_nodes.identification.innovations import runs_of
-from fric_nodes.instrument import inspect
-from fric_nodes.record import Array, Record
-from fric_nodes.signals.stamps import evened
+from fric.diagnosis import diagnose
+from fric.diagnosis.prove import draw
+from fric.diagnosis.start import lateness
+from fric.identification.innovations import runs_of
+from fric.instrument import inspect
+from fric.record import Array, Record
+from fric.signals.stamps import evened
 
 pytestmark = pytest.mark.timeout(600)
 

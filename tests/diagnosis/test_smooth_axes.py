@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis import Diagnosis, diagnose
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.record import Array, Record
+from fric.diagnosis import Diagnosis, diagnose
+from fric.model import Model, Term, build_model, term
+from fric.record import Array, Record
 from scipy.integrate import solve_ivp
 
 pytestmark = pytest.mark.timeout(600)

@@ -7,11 +7,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.fitting import best_track
-from fric_nodes.diagnosis.track import Track
-from fric_nodes.diagnosis.twin import twins
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.record import Record
+from fric.diagnosis.fitting import best_track
+from fric.diagnosis.track import Track
+from fric.diagnosis.twin import twins
+from fric.model import Model, Term, build_model, term
+from fric.record import Record
 from scipy.integrate import solve_ivp
 
 MASS, VISCOUS, LACKING = 2.0, 300.0, 5.0

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.suspects import suspects
-from fric_nodes.diagnosis.watch import Phase, Watch, WatchSettings
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.record import Array
-from fric_nodes.simulate import Simulator, substeps
+from fric.diagnosis.suspects import suspects
+from fric.diagnosis.watch import Phase, Watch, WatchSettings
+from fric.model import Model, Term, build_model, term
+from fric.record import Array
+from fric.simulate import Simulator, substeps
 
 H = 0.002
 

@@ -6,12 +6,12 @@ import time
 
 import numpy as np
 import pytest
-from fric_nodes.diagnosis.universe import common_effects, universe_of
-from fric_nodes.effect import Effect
-from fric_nodes.effects import EFFECTS
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.record import Array
-from fric_nodes.simulate import Simulator, simulate
+from fric.diagnosis.universe import common_effects, universe_of
+from fric.effect import Effect
+from fric.effects import EFFECTS
+from fric.model import Model, Term, build_model, term
+from fric.record import Array
+from fric.simulate import Simulator, simulate
 
 H = 1e-3
 ABLE = common_effects()

@@ -10,17 +10,17 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-import fric_nodes.effects
+import fric.effects
 import numpy as np
 import pytest
-from fric_nodes.effect import Context, Effect, Place
-from fric_nodes.effects import EFFECTS, by_name
-from fric_nodes.model import Model, Term, build_model
-from fric_nodes.model_file import model_from_text, model_to_text
-from fric_nodes.parameter import Parameter
-from fric_nodes.plants import PLANTS
-from fric_nodes.record import Units
-from fric_nodes.simulate import Simulator
+from fric.effect import Context, Effect, Place
+from fric.effects import EFFECTS, by_name
+from fric.model import Model, Term, build_model
+from fric.model_file import model_from_text, model_to_text
+from fric.parameter import Parameter
+from fric.plants import PLANTS
+from fric.record import Units
+from fric.simulate import Simulator
 
 # Every id that an effect may have.
 VOCABULARY = {
@@ -110,8 +110,8 @@ def memories(effect: Effect, base: float = 2.0) -> Iterator[np.ndarray]:
 
 
 def test_every_module_of_the_folder_is_in_the_catalogue() -> None:
-    modules = {info.name for info in pkgutil.iter_modules(fric_nodes.effects.__path__)}
-    defined = {importlib.import_module(f"fric_nodes.effects.{name}").EFFECT for name in modules}
+    modules = {info.name for info in pkgutil.iter_modules(fric.effects.__path__)}
+    defined = {importlib.import_module(f"fric.effects.{name}").EFFECT for name in modules}
     assert defined == set(EFFECTS.values())
     # All that the contract names but for ``unknown``, which is a finding and not an effect.
     assert {effect.id for effect in EFFECTS.values()} == VOCABULARY - {"unknown"}

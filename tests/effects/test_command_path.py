@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.control.feedforward import Feedforward
-from fric_nodes.effects import EFFECTS
-from fric_nodes.model import build_model, term
-from fric_nodes.simulate import Simulator, predict_force, simulate
+from fric.control.feedforward import Feedforward
+from fric.effects import EFFECTS
+from fric.model import build_model, term
+from fric.simulate import Simulator, predict_force, simulate
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm
 

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fric_nodes.effect import Context
-from fric_nodes.effects import EFFECTS
-from fric_nodes.model import Term, build_model, term
-from fric_nodes.simulate import Simulator, predict_force
+from fric.effect import Context
+from fric.effects import EFFECTS
+from fric.model import Term, build_model, term
+from fric.simulate import Simulator, predict_force
 from scipy.integrate import quad, solve_ivp
 
 SPEEDS = [-2.0, -0.01, 1e-9, 0.003, 0.7]

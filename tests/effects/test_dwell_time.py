@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fric_nodes.effect import Context
-from fric_nodes.effects import EFFECTS
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.simulate import Predictor, Simulator
-from fric_nodes.steps.ageing import grow_older
+from fric.effect import Context
+from fric.effects import EFFECTS
+from fric.model import Model, build_model, term
+from fric.simulate import Predictor, Simulator
+from fric.steps.ageing import grow_older
 from scipy.integrate import solve_ivp
 
 F_C, D_0, MASS = 4.0, 1e-4, 1.5

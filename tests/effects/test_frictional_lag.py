@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fric_nodes.effect import Context
-from fric_nodes.effects import EFFECTS
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.simulate import Predictor, Simulator
+from fric.effect import Context
+from fric.effects import EFFECTS
+from fric.model import Model, build_model, term
+from fric.simulate import Predictor, Simulator
 from scipy.integrate import solve_ivp
 
 F_C, SURPLUS, V_S, F_V = 4.0, 3.0, 0.02, 10.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.simulate import Predictor, Simulator, simulate, substeps
+from fric.model import Model, build_model, term
+from fric.simulate import Predictor, Simulator, simulate, substeps
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

@@ -7,8 +7,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from fric_nodes.effect import Effect
-from fric_nodes.effects import EFFECTS
+from fric.effect import Effect
+from fric.effects import EFFECTS
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

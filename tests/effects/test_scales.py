@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.effect import Context
-from fric_nodes.effects import EFFECTS
-from fric_nodes.model import build_model, term
-from fric_nodes.simulate import Simulator, predict_force
+from fric.effect import Context
+from fric.effects import EFFECTS
+from fric.model import build_model, term
+from fric.simulate import Simulator, predict_force
 
 
 def scaled(key: str, *p: float, q: float = 0.0, t: float = 0.0, load: float = 1.0, temperature: float = 0.0) -> float:

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.effect import Context
-from fric_nodes.effects import EFFECTS
-from fric_nodes.effects.impact_backlash import damping_for, duration, restitution
-from fric_nodes.effects.impact_backlash_hunt_crossley import restitution as crossley_restitution
-from fric_nodes.model import Model, ModelError, Term, build_model, term
-from fric_nodes.simulate import Simulator
+from fric.effect import Context
+from fric.effects import EFFECTS
+from fric.effects.impact_backlash import damping_for, duration, restitution
+from fric.effects.impact_backlash_hunt_crossley import restitution as crossley_restitution
+from fric.model import Model, ModelError, Term, build_model, term
+from fric.simulate import Simulator
 from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.excitation import EXCITATIONS
-from fric_nodes.excitation.sequence import Sequence
-from fric_nodes.excitation_kind import OUTPUTS, Excitation, ExcitationError, Trajectory
+from fric.excitation import EXCITATIONS
+from fric.excitation.sequence import Sequence
+from fric.excitation_kind import OUTPUTS, Excitation, ExcitationError, Trajectory
 
 PLANNED = {name: kind for name, kind in EXCITATIONS.items() if kind.plan is not None}
 MJ = 10.0 / 3.0**0.5  # largest acceleration of a minimum-jerk move, times T^2 over its way

@@ -6,12 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from fric_nodes.excitation import EXCITATIONS
-from fric_nodes.excitation.parametric_oscillation import Oscillation
-from fric_nodes.excitation.sequence import Sequence
-from fric_nodes.excitation_kind import ExcitationError
-from fric_nodes.model import build_model, term
-from fric_nodes.simulate import Simulator
+from fric.excitation import EXCITATIONS
+from fric.excitation.parametric_oscillation import Oscillation
+from fric.excitation.sequence import Sequence
+from fric.excitation_kind import ExcitationError
+from fric.model import build_model, term
+from fric.simulate import Simulator
 
 H = 5e-4
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.excitation import EXCITATIONS
-from fric_nodes.excitation_kind import ExcitationError
+from fric.excitation import EXCITATIONS
+from fric.excitation_kind import ExcitationError
 
 VALUES = {"midpoint": 0.085, "height": 0.05, "ramp_time": 2.5, "hold": 4.0, "edge_time": 0.02}
 

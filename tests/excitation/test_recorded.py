@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio.write import write_record
-from fric_nodes.errors import InputError
-from fric_nodes.excitation import EXCITATIONS
-from fric_nodes.excitation_kind import Trajectory
-from fric_nodes.record import Record
+from fric.bagio.write import write_record
+from fric.errors import InputError
+from fric.excitation import EXCITATIONS
+from fric.excitation_kind import Trajectory
+from fric.record import Record
 
 TIME = np.arange(0.0, 4.0, 0.002)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.excitation import EXCITATIONS
-from fric_nodes.excitation.prbs import maximum_length_sequence
-from fric_nodes.excitation.presliding_loops import turning_points
-from fric_nodes.excitation_kind import Points
+from fric.excitation import EXCITATIONS
+from fric.excitation.prbs import maximum_length_sequence
+from fric.excitation.presliding_loops import turning_points
+from fric.excitation_kind import Points
 
 
 def _plan(name: str, seed: int = 3, **changes: float):  # type: ignore[no-untyped-def]

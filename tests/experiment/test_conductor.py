@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from fric_nodes.experiment.choice import Bounds, next_setting
-from fric_nodes.experiment.conductor import AUTO, Conductor, Outcome, Waiting
-from fric_nodes.experiment.knowledge import Knowledge
-from fric_nodes.experiment.motion import REST, Cut, Drive, ExperimentError, Law, Limits, Quiet, Sample, SwingWatch
-from fric_nodes.experiment.runs import FORCED, FREE, Placing, Setting, Timing, decay
-from fric_nodes.experiment.settings import NUMBERS, bounds_of
+from fric.experiment.choice import Bounds, next_setting
+from fric.experiment.conductor import AUTO, Conductor, Outcome, Waiting
+from fric.experiment.knowledge import Knowledge
+from fric.experiment.motion import REST, Cut, Drive, ExperimentError, Law, Limits, Quiet, Sample, SwingWatch
+from fric.experiment.runs import FORCED, FREE, Placing, Setting, Timing, decay
+from fric.experiment.settings import NUMBERS, bounds_of
 
 H = 0.002
 TIMING = Timing(place=0.5, settle=2.0, quiet=0.2, oscillation=6.0, periods=8)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.friction import asperity_growth as laws
-from fric_nodes.friction import asperity_loops as loops
-from fric_nodes.friction.asperity import GROWTH_LAWS, AsperityError, AsperityParameters, AsperityPopulation
+from fric.friction import asperity_growth as laws
+from fric.friction import asperity_loops as loops
+from fric.friction.asperity import GROWTH_LAWS, AsperityError, AsperityParameters, AsperityPopulation
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad

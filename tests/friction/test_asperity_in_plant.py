@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.friction.asperity import AsperityParameters, AsperityPopulation
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.simulate import Predictor, Simulator
+from fric.friction.asperity import AsperityParameters, AsperityPopulation
+from fric.model import Model, build_model, term
+from fric.simulate import Predictor, Simulator
 
 LEVEL, STIFFNESS, WAVE, TIME, GROWTH, N = 4.0, 2e5, 1e-3, 0.05, 3.0, 400
 GAP = 0.8

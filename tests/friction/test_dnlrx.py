@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.friction.dnlrx import (
+from fric.friction.dnlrx import (
     DnlrxError,
     DnlrxModel,
     DnlrxPredictor,
@@ -16,8 +16,8 @@ from fric_nodes.friction.dnlrx import (
     poles,
     step_at_slip,
 )
-from fric_nodes.friction.dnlrx_file import dnlrx_from_text, dnlrx_to_text, read_dnlrx, write_dnlrx
-from fric_nodes.friction.dnlrx_regression import (
+from fric.friction.dnlrx_file import dnlrx_from_text, dnlrx_to_text, read_dnlrx, write_dnlrx
+from fric.friction.dnlrx_regression import (
     deformations,
     from_coefficients,
     noe,
@@ -25,7 +25,7 @@ from fric_nodes.friction.dnlrx_regression import (
     sliding_start,
     spread_thresholds,
 )
-from fric_nodes.record import Units
+from fric.record import Units
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.friction.enclosing_simplex import blown_up, far_simplex, least_simplex
-from fric_nodes.friction.tensor_product import TensorProductFriction, from_data, from_law, from_model, velocity_grid
-from fric_nodes.friction.tensor_product_transformation import (
+from fric.friction.enclosing_simplex import blown_up, far_simplex, least_simplex
+from fric.friction.tensor_product import TensorProductFriction, from_data, from_law, from_model, velocity_grid
+from fric.friction.tensor_product_transformation import (
     TensorProduct,
     TensorProductError,
     Weighting,
@@ -14,8 +14,8 @@ from fric_nodes.friction.tensor_product_transformation import (
     sample,
     transform,
 )
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.simulate import simulate
+from fric.model import Model, build_model, term
+from fric.simulate import simulate
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

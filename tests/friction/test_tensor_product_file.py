@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.errors import InputError
-from fric_nodes.friction.tensor_product import TensorProductFriction, from_points
-from fric_nodes.friction.tensor_product_file import (
+from fric.errors import InputError
+from fric.friction.tensor_product import TensorProductFriction, from_points
+from fric.friction.tensor_product_file import (
     read_tensor_product,
     tensor_product_from_text,
     tensor_product_to_text,
     write_tensor_product,
 )
-from fric_nodes.record import Units
+from fric.record import Units
 
 
 def law() -> TensorProductFriction:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from fric_nodes.record import Record
+from fric.record import Record
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

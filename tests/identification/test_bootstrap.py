@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.identification.bootstrap import Bootstrap, block_bootstrap, drawn_series, drawn_weights
-from fric_nodes.identification.problem import Problem
-from fric_nodes.identification.profile import profile
+from fric.identification.bootstrap import Bootstrap, block_bootstrap, drawn_series, drawn_weights
+from fric.identification.problem import Problem
+from fric.identification.profile import profile
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.calibration import AXES, Calibration, calibrate, recording
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.uncertainty import KINDS, assess
+from fric.identification import METHODS
+from fric.identification.calibration import AXES, Calibration, calibrate, recording
+from fric.identification.result import Options
+from fric.identification.uncertainty import KINDS, assess
 
 
 def test_coverage_of_right_and_of_too_small_errors() -> None:
@@ -78,7 +78,7 @@ def test_every_kind_gives_intervals_of_about_the_same_width(kind: str) -> None:
 def test_an_unknown_kind_or_method_is_refused() -> None:
     from dataclasses import replace
 
-    from fric_nodes.errors import InputError
+    from fric.errors import InputError
 
     axis = AXES["rigid"]
     records = [recording(axis, 21)]

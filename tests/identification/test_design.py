@@ -15,16 +15,16 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from fric_nodes.control.pid import Pid
-from fric_nodes.excitation import EXCITATIONS
-from fric_nodes.excitation_kind import Excitation, Points
-from fric_nodes.identification.design import DesignError, Limits, Proposal, Rig, problem_for, propose
-from fric_nodes.identification.design.settings import draw, ranges_of, usable
-from fric_nodes.identification.design.trial import gains_for, sequence_of
-from fric_nodes.identification.result import Options
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.parameter import Parameter
-from fric_nodes.report.design import design_report
+from fric.control.pid import Pid
+from fric.excitation import EXCITATIONS
+from fric.excitation_kind import Excitation, Points
+from fric.identification.design import DesignError, Limits, Proposal, Rig, problem_for, propose
+from fric.identification.design.settings import draw, ranges_of, usable
+from fric.identification.design.trial import gains_for, sequence_of
+from fric.identification.result import Options
+from fric.model import Model, build_model, term
+from fric.parameter import Parameter
+from fric.report.design import design_report
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -106,8 +106,8 @@ def test_the_limits_hold_on_an_axis_simulated_by_other_means(slow: Proposal) -> 
 
 def test_the_promise_is_kept(small: Proposal) -> None:
     """Fits to recordings with noise of their own scatter as was promised."""
-    from fric_nodes.identification import METHODS
-    from fric_nodes.identification.design.trial import recorded, simulated
+    from fric.identification import METHODS
+    from fric.identification.design.trial import recorded, simulated
 
     truth, problem = small.problem.model, small.problem
     motion = simulated(truth, small.parts, RIG, LIMITS, problem.gains, finer=4)

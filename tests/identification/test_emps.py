@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.online import OnlineIdentifier
-from fric_nodes.identification.result import Options
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.record import Record
+from fric.identification import METHODS
+from fric.identification.online import OnlineIdentifier
+from fric.identification.result import Options
+from fric.model import Model, Term, build_model, term
+from fric.record import Record
 from scipy.io import loadmat
 
 pytestmark = pytest.mark.real_data

@@ -7,18 +7,18 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.forced_oscillation import (
+from fric.identification import METHODS
+from fric.identification.methods.forced_oscillation import (
     Forced,
     forced_mechanics,
     forced_response,
     harmonics_of,
     main_frequency,
 )
-from fric_nodes.identification.result import IdentificationError, Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.model import Model
-from fric_nodes.record import Record, Units
+from fric.identification.result import IdentificationError, Options
+from fric.identification.start import start_model
+from fric.model import Model
+from fric.record import Record, Units
 from scipy.integrate import solve_ivp
 
 M, C, K = 2.0, 3.0, 50.0

@@ -6,7 +6,7 @@ import threading
 
 import numpy as np
 import pytest
-from fric_nodes.identification.gauss_newton import Solution, minimise
+from fric.identification.gauss_newton import Solution, minimise
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 

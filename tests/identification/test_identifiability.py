@@ -7,16 +7,16 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fric_nodes.effects import EFFECTS
-from fric_nodes.errors import InputError
-from fric_nodes.excitation import EXCITATIONS
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.free_parameters import FreeParameters
-from fric_nodes.identification.identifiability import Foreseen, foresee
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.record import Record, Units
+from fric.effects import EFFECTS
+from fric.errors import InputError
+from fric.excitation import EXCITATIONS
+from fric.identification import METHODS
+from fric.identification.free_parameters import FreeParameters
+from fric.identification.identifiability import Foreseen, foresee
+from fric.identification.result import Options
+from fric.identification.start import start_model
+from fric.model import Model, build_model, term
+from fric.record import Record, Units
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -172,7 +172,7 @@ def test_a_stribeck_velocity_without_slow_motion_is_named() -> None:
 def test_every_statement_is_made_without_naming_an_effect() -> None:
     import inspect
 
-    from fric_nodes.identification import identifiability
+    from fric.identification import identifiability
 
     source = inspect.getsource(identifiability)
     for effect in EFFECTS.values():

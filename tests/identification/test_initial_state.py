@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.scoring import score
-from fric_nodes.model import build_model, term
-from fric_nodes.signals.initial_state import initial_state
-from fric_nodes.signals.instrument_noise import level_of
+from fric.identification import METHODS
+from fric.identification.result import Options
+from fric.identification.scoring import score
+from fric.model import build_model, term
+from fric.signals.initial_state import initial_state
+from fric.signals.instrument_noise import level_of
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

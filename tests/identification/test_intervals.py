@@ -9,13 +9,13 @@ from functools import partial
 
 import numpy as np
 import pytest
-from fric_nodes.bench.calibration_oscillation import CASES, free, parametric
-from fric_nodes.bench.calibration_static import TRIALS
-from fric_nodes.bench.calibration_two_stage import LIMITS, SPRINGS, recorded, structure, trial, truth
-from fric_nodes.bench.trials import Finding, count, figures_of
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import IdentificationError, Options
-from fric_nodes.identification.static_maps.weighted import as_normal, weighted
+from fric.bench.benchmarks.calibration_oscillation import CASES, free, parametric
+from fric.bench.benchmarks.calibration_static import TRIALS
+from fric.bench.benchmarks.calibration_two_stage import LIMITS, SPRINGS, recorded, structure, trial, truth
+from fric.bench.trials import Finding, count, figures_of
+from fric.identification import METHODS
+from fric.identification.result import IdentificationError, Options
+from fric.identification.static_maps.weighted import as_normal, weighted
 from scipy import stats
 
 

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS, inverse_dynamics
-from fric_nodes.identification.equations import equations, nominal_conditions, surroundings
-from fric_nodes.identification.filter_bias import residual_of_filters
-from fric_nodes.identification.result import Identification, IdentificationError, Options
-from fric_nodes.identification.scoring import force_along, score
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.record import Record, RecordError
+from fric.identification import METHODS
+from fric.identification.equations import equations, nominal_conditions, surroundings
+from fric.identification.filter_bias import residual_of_filters
+from fric.identification.methods import inverse_dynamics
+from fric.identification.result import Identification, IdentificationError, Options
+from fric.identification.scoring import force_along, score
+from fric.model import Model, Term, build_model, term
+from fric.record import Record, RecordError
 from scipy import signal
 
 FIT = METHODS["inverse-dynamics"].fit

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.free_parameters import FreeParameters
-from fric_nodes.identification.misfit import gap
-from fric_nodes.identification.result import Identification, IdentificationError, Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.identification.verdict import warnings_of
-from fric_nodes.model import build_model, term
-from fric_nodes.record import Record, Units
+from fric.identification import METHODS
+from fric.identification.free_parameters import FreeParameters
+from fric.identification.misfit import gap
+from fric.identification.result import Identification, IdentificationError, Options
+from fric.identification.start import start_model
+from fric.identification.verdict import warnings_of
+from fric.model import build_model, term
+from fric.record import Record, Units
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from fric_nodes.identification.free_parameters import FreeParameters
-from fric_nodes.identification.multi_start import Ends, best_of
-from fric_nodes.identification.result import Options
-from fric_nodes.model import Model, build_model, term
+from fric.identification.free_parameters import FreeParameters
+from fric.identification.multi_start import Ends, best_of
+from fric.identification.result import Options
+from fric.model import Model, build_model, term
 
 
 @dataclass

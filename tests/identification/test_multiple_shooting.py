@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.errors import InputError
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.equations import equations
-from fric_nodes.identification.force_errors import force_errors
-from fric_nodes.identification.free_parameters import FreeParameters
-from fric_nodes.identification.multiple_shooting import Shooting, shooting
-from fric_nodes.identification.result import Identification, Options
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.record import Record
+from fric.errors import InputError
+from fric.identification import METHODS
+from fric.identification.equations import equations
+from fric.identification.force_errors import force_errors
+from fric.identification.free_parameters import FreeParameters
+from fric.identification.multiple_shooting import Shooting, shooting
+from fric.identification.result import Identification, Options
+from fric.model import Model, build_model, term
+from fric.record import Record
 
 FIT = METHODS["output-error"].fit
 UPRIGHT = {"inertia": 0.5, "gravity": 6.0, "coulomb.force": 0.15, "viscous.coefficient": 0.2}

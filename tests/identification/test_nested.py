@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio.importing import import_recording
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.free_parameters import FreeParameters
-from fric_nodes.identification.nested import searched_terms
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.screen import screened
-from fric_nodes.identification.start import start_model
-from fric_nodes.model_file import read_model
-from fric_nodes.record import Record, Units
+from fric.bagio.importing import import_recording
+from fric.identification import METHODS
+from fric.identification.free_parameters import FreeParameters
+from fric.identification.nested import searched_terms
+from fric.identification.result import Options
+from fric.identification.screen import screened
+from fric.identification.start import start_model
+from fric.model_file import read_model
+from fric.record import Record, Units
 from scipy.io import loadmat
 
 WORSE = 1e-3  # relative growth of the training error that is allowed

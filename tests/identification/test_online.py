@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.calibration import AXES, recording
-from fric_nodes.identification.online import Estimate, OnlineIdentifier, State
-from fric_nodes.identification.result import Options
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.record import Record
+from fric.identification import METHODS
+from fric.identification.calibration import AXES, recording
+from fric.identification.online import Estimate, OnlineIdentifier, State
+from fric.identification.result import Options
+from fric.model import Model, build_model, term
+from fric.record import Record
 
 NAMES = ("mass", "coulomb.force", "viscous.coefficient", "bias.force")
 

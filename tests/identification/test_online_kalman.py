@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.identification.online import ESTIMATORS, Estimate, Estimator, State, make_estimator
-from fric_nodes.identification.online.loops import carry, collapse, correct, scatter, tell
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.record import Record
+from fric.identification.online import ESTIMATORS, Estimate, Estimator, State, make_estimator
+from fric.identification.online.loops import carry, collapse, correct, scatter, tell
+from fric.model import Model, build_model, term
+from fric.record import Record
 
 NAMES = ("mass", "coulomb.force", "viscous.coefficient", "bias.force")
 KINDS = ("ekf", "ukf")

@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.hilbert import hilbert
-from fric_nodes.identification.log_decrement import log_decrement, textbook
-from fric_nodes.identification.oscillation.motion import Natural, chain, leading_position, plain_motion
-from fric_nodes.identification.oscillation.peaks import find_peaks
-from fric_nodes.identification.oscillation.recording import Oscillation, find_oscillation, turning_points
-from fric_nodes.identification.oscillation.result import FreeOscillation
-from fric_nodes.identification.result import IdentificationError, Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.identification.wavelet_ridge import wavelet_ridge
-from fric_nodes.model import Model
-from fric_nodes.record import Record, Units
-from fric_nodes.verification.free_oscillation_reference import PENDULUMS, Pendulum, recorded, swing
+from fric.identification import METHODS
+from fric.identification.methods.hilbert import hilbert
+from fric.identification.methods.log_decrement import log_decrement, textbook
+from fric.identification.methods.wavelet_ridge import wavelet_ridge
+from fric.identification.oscillation.motion import Natural, chain, leading_position, plain_motion
+from fric.identification.oscillation.peaks import find_peaks
+from fric.identification.oscillation.recording import Oscillation, find_oscillation, turning_points
+from fric.identification.oscillation.result import FreeOscillation
+from fric.identification.result import IdentificationError, Options
+from fric.identification.start import start_model
+from fric.model import Model
+from fric.record import Record, Units
+from fric.verification.free_oscillation_reference import PENDULUMS, Pendulum, recorded, swing
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.identification.hilbert import hilbert, hilbert_envelope
-from fric_nodes.identification.oscillation.backlash import backbone, free_play
-from fric_nodes.identification.oscillation.envelope import cycle_mean, natural_of, reading
-from fric_nodes.identification.oscillation.morlet import modes, morlet
-from fric_nodes.identification.oscillation.recording import find_oscillation
-from fric_nodes.identification.wavelet_ridge import wavelet_envelope
-from fric_nodes.record import Record
-from fric_nodes.verification.free_oscillation_reference import Pendulum, recorded, swing
+from fric.identification.methods.hilbert import hilbert, hilbert_envelope
+from fric.identification.methods.wavelet_ridge import wavelet_envelope
+from fric.identification.oscillation.backlash import backbone, free_play
+from fric.identification.oscillation.envelope import cycle_mean, natural_of, reading
+from fric.identification.oscillation.morlet import modes, morlet
+from fric.identification.oscillation.recording import find_oscillation
+from fric.record import Record
+from fric.verification.free_oscillation_reference import Pendulum, recorded, swing
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.parametric_oscillation import parametric_mechanics
-from fric_nodes.identification.result import IdentificationError, Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.model import build_model, term
-from fric_nodes.record import Units
-from fric_nodes.verification.free_oscillation_reference import INERTIA, PENDULUMS, STIFFNESS, Pendulum, gain, recorded, swing
+from fric.identification import METHODS
+from fric.identification.methods.parametric_oscillation import parametric_mechanics
+from fric.identification.result import IdentificationError, Options
+from fric.identification.start import start_model
+from fric.model import build_model, term
+from fric.record import Units
+from fric.verification.free_oscillation_reference import INERTIA, PENDULUMS, STIFFNESS, Pendulum, gain, recorded, swing
 
 M, C, K = 2.0, 3.0, 50.0
 SMALL = np.diag([1e-4, 1e-5]) ** 2

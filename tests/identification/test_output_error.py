@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import Options
-from fric_nodes.model import Model, Term, build_model, term
+from fric.identification import METHODS
+from fric.identification.result import Options
+from fric.model import Model, Term, build_model, term
 
 FIT = METHODS["output-error"].fit
 TRUE = {"mass": 2.0, "coulomb.force": 8.0, "viscous.coefficient": 15.0, "bias.force": 0.8, "asymmetry.coefficient": 2.0}

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import Options
-from fric_nodes.model import Model, Term, build_model, term
+from fric.identification import METHODS
+from fric.identification.result import Options
+from fric.model import Model, Term, build_model, term
 
 FIT = METHODS["prediction-error"].fit
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.identification.static_maps.smoothness import structure_of
+from fric.identification.static_maps.smoothness import structure_of
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

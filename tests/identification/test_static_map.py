@@ -13,15 +13,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import IdentificationError, Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.identification.static_map import static_map
-from fric_nodes.identification.static_maps.curve import Points, choose
-from fric_nodes.identification.static_maps.parts import find_parts, knee, mean_and_error, motion_of
-from fric_nodes.identification.static_maps.result import StaticMap, map_table
-from fric_nodes.record import Record, Units
-from fric_nodes.report.static_map import static_map_report
+from fric.identification import METHODS
+from fric.identification.methods.static_map import static_map
+from fric.identification.result import IdentificationError, Options
+from fric.identification.start import start_model
+from fric.identification.static_maps.curve import Points, choose
+from fric.identification.static_maps.parts import find_parts, knee, mean_and_error, motion_of
+from fric.identification.static_maps.result import StaticMap, map_table
+from fric.record import Record, Units
+from fric.report.static_map import static_map_report
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -315,8 +315,8 @@ def test_the_table_and_the_page_hold_the_maps() -> None:
 
 
 def test_the_command_writes_map_model_and_page(tmp_path: Path) -> None:
-    from fric_nodes.bagio.write import write_record
-    from fric_nodes.model_file import read_model
+    from fric.bagio.write import write_record
+    from fric.model_file import read_model
 
     assert "static-map" in METHODS
     write_record(ladder(1.5), tmp_path / "bag")

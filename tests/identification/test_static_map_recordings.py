@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fric_nodes.bagio.importing import import_recording
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.identification.static_map import static_map
-from fric_nodes.identification.static_maps.result import StaticMap
-from fric_nodes.record import Record
+from fric.bagio.importing import import_recording
+from fric.identification.methods.static_map import static_map
+from fric.identification.result import Options
+from fric.identification.start import start_model
+from fric.identification.static_maps.result import StaticMap
+from fric.record import Record
 
 pytestmark = pytest.mark.real_data
 

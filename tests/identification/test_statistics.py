@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.identification.statistics import bartlett_lag, by_parts, sandwich_covariance
+from fric.identification.statistics import bartlett_lag, by_parts, sandwich_covariance
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.bench.calibration_tensor_product import ratio
-from fric_nodes.friction.tensor_product_file import tensor_product_from_text
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import IdentificationError, Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.identification.tensor_product import TensorProductIdentification
-from fric_nodes.model import Model
-from fric_nodes.model_file import model_from_text, model_to_text
-from fric_nodes.record import Record, Units
+from fric.bench.benchmarks.calibration_tensor_product import ratio
+from fric.friction.tensor_product_file import tensor_product_from_text
+from fric.identification import METHODS
+from fric.identification.methods.tensor_product import TensorProductIdentification
+from fric.identification.result import IdentificationError, Options
+from fric.identification.start import start_model
+from fric.model import Model
+from fric.model_file import model_from_text, model_to_text
+from fric.record import Record, Units
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

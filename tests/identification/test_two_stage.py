@@ -8,20 +8,20 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from fric_nodes.bench import calibration_two_stage
-from fric_nodes.friction.dnlrx_file import dnlrx_from_text
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.dnlrx.cost import Cost, differences, to_taps
-from fric_nodes.identification.dnlrx.fit import fit_dnlrx
-from fric_nodes.identification.dnlrx.linear import rows_of, solve
-from fric_nodes.identification.dnlrx.order import choose_order
-from fric_nodes.identification.dnlrx.samples import Prepared, prepare
-from fric_nodes.identification.dnlrx.search import search
-from fric_nodes.identification.result import IdentificationError, Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.identification.two_stage import TwoStageIdentification
-from fric_nodes.model import build_model, term
-from fric_nodes.record import Record
+from fric.bench.benchmarks import calibration_two_stage
+from fric.friction.dnlrx_file import dnlrx_from_text
+from fric.identification import METHODS
+from fric.identification.dnlrx.cost import Cost, differences, to_taps
+from fric.identification.dnlrx.fit import fit_dnlrx
+from fric.identification.dnlrx.linear import rows_of, solve
+from fric.identification.dnlrx.order import choose_order
+from fric.identification.dnlrx.samples import Prepared, prepare
+from fric.identification.dnlrx.search import search
+from fric.identification.methods.two_stage import TwoStageIdentification
+from fric.identification.result import IdentificationError, Options
+from fric.identification.start import start_model
+from fric.model import build_model, term
+from fric.record import Record
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

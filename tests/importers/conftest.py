@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import import_recording
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import Options
-from fric_nodes.model import build_model, term
-from fric_nodes.record import Record
+from fric.bagio import import_recording
+from fric.identification import METHODS
+from fric.identification.result import Options
+from fric.model import build_model, term
+from fric.record import Record
 
 TRUE = {"mass": 2.0, "coulomb.force": 5.0, "viscous.coefficient": 12.0}
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.errors import InputError
+from fric.errors import InputError
 from scipy.io import savemat
 
 

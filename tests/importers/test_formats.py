@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.errors import InputError
-from fric_nodes.importers import TextOptions, importers, load_table
-from fric_nodes.importers.mat_format import values_of
+from fric.errors import InputError
+from fric.importers import TextOptions, importers, load_table
+from fric.importers.mat_format import values_of
 from scipy.io import savemat
 
 N = 50

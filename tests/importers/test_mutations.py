@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import import_recording, load_mapping
-from fric_nodes.errors import InputError
-from fric_nodes.importers import text
-from fric_nodes.record import Record
+from fric.bagio import import_recording, load_mapping
+from fric.errors import InputError
+from fric.importers import text
+from fric.record import Record
 
 _SPEC = importlib.util.spec_from_file_location("mutations", Path(__file__).with_name("mutations.py"))
 assert _SPEC is not None

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.errors import InputError
-from fric_nodes.record import Record
+from fric.errors import InputError
+from fric.record import Record
 
 N = 60
 T = np.arange(N) * 0.001

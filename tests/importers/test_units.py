@@ -6,8 +6,8 @@ import json
 from typing import Any
 
 import pytest
-from fric_nodes.errors import InputError
-from fric_nodes.importers.units import closest_units, unit
+from fric.errors import InputError
+from fric.importers.units import closest_units, unit
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fric_nodes.record import Record
+from fric.record import Record
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

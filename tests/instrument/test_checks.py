@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.instrument import CHECKS, Evidence, Finding, inspect
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.record import Record
+from fric.instrument import CHECKS, Evidence, Finding, inspect
+from fric.model import Model, build_model, term
+from fric.record import Record
 
 Write = Callable[..., Record]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio.importing import import_recording
-from fric_nodes.instrument import Finding, faults, inspect
-from fric_nodes.record import Record
+from fric.bagio.importing import import_recording
+from fric.instrument import Finding, faults, inspect
+from fric.record import Record
 from scipy.io import loadmat
 
 pytestmark = pytest.mark.real_data

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fric_nodes.instrument import Finding
-from fric_nodes.report.checks import checks_rows, checks_section, checks_sentence
+from fric.instrument import Finding
+from fric.report.checks import checks_rows, checks_section, checks_sentence
 
 LATE = Finding("delay", "fault", "the effort comes late", 0.01, "s", (0.009, 0.011), "one clock", recording=1)
 FINE = Finding("delay", "ok", "together", 0.0, "s", recording=0)

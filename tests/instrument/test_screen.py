@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fric_nodes.identification.screen import screened
-from fric_nodes.instrument import CHECKS, Evidence, Finding
-from fric_nodes.record import Record
+from fric.identification.screen import screened
+from fric.instrument import CHECKS, Evidence, Finding
+from fric.record import Record
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from fric_nodes.instrument import CHECKS, Evidence
-from fric_nodes.instrument.trials.faults import FAULTS, Fault
-from fric_nodes.instrument.trials.score import false_alarms, ordinary_alarms
+from fric.instrument import CHECKS, Evidence
+from fric.instrument.trials.faults import FAULTS, Fault
+from fric.instrument.trials.score import false_alarms, ordinary_alarms
 
 
 def test_every_check_that_a_recording_alone_can_fail_has_a_fault() -> None:

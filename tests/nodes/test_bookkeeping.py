@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from fric_nodes.model import ModelError, build_model, term
+from fric.model import ModelError, build_model, term
 from fric_nodes.nodes.convert import MessageError, joint_sample, model_from_message, model_to_message, nanoseconds, set_stamp
 from fric_nodes.nodes.lockstep import Answers, Stream
 from fric_nodes.nodes.timing import Deadlines

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.model_file import write_model
+from fric.model import Model, build_model, term
+from fric.model_file import write_model
 from fric_nodes.nodes.compensator import CompensatorNode
 from fric_nodes.nodes.convert import model_to_message, set_stamp
 from fric_nodes.nodes.lean_executor import LeanExecutor

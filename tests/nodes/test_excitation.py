@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from fric_nodes.axis import SimulatedAxis
-from fric_nodes.excitation import EXCITATIONS
-from fric_nodes.excitation.sequence import Sequence
-from fric_nodes.excitation_kind import ExcitationError
-from fric_nodes.model import build_model, term
-from fric_nodes.model_file import write_model
+from fric.axis import SimulatedAxis
+from fric.excitation import EXCITATIONS
+from fric.excitation.sequence import Sequence
+from fric.excitation_kind import ExcitationError
+from fric.model import build_model, term
+from fric.model_file import write_model
 from fric_nodes.nodes.excitation import ExcitationNode
 from fric_nodes.nodes.lean_executor import LeanExecutor
 from rclpy.parameter import Parameter

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import read_record
-from fric_nodes.experiment.motion import Drive, Sample
-from fric_nodes.model_file import read_model
+from fric.bagio import read_record
+from fric.experiment.motion import Drive, Sample
+from fric.model_file import read_model
 from fric_nodes.nodes.base import LOCK_STEP, LoopNode
 from fric_nodes.nodes.experiment import ExperimentNode
 from fric_nodes.nodes.experiment_drive import ControllerDrive

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import BagWriter, write_record
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.start import start_model
-from fric_nodes.model_file import read_model
+from fric.bagio import BagWriter, write_record
+from fric.identification import METHODS
+from fric.identification.result import Options
+from fric.identification.start import start_model
+from fric.model_file import read_model
+from fric.record import Record, Units
 from fric_nodes.nodes.convert import model_from_message
 from fric_nodes.nodes.identifier import IdentifierNode
-from fric_nodes.record import Record, Units
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from fric_nodes.diagnosis.watch import Phase
-from fric_nodes.model import Model, build_model, term
-from fric_nodes.model_file import write_model
+from fric.diagnosis.watch import Phase
+from fric.model import Model, build_model, term
+from fric.model_file import write_model
 from fric_nodes.nodes.monitor import MonitorNode
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from fric_nodes.excitation import EXCITATIONS
+from fric.excitation import EXCITATIONS
 from fric_nodes.nodes.compensator import CompensatorNode
 from fric_nodes.nodes.excitation import ExcitationNode
 from fric_nodes.nodes.parameters import NodeParameter, NodeParameterError, Settings

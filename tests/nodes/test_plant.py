@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from fric_nodes.axis import SimulatedAxis
-from fric_nodes.bagio import iterate_raw, read_record
-from fric_nodes.excitation import EXCITATIONS
-from fric_nodes.excitation.sequence import Sequence
-from fric_nodes.model_file import read_model
+from fric.axis import SimulatedAxis
+from fric.bagio import iterate_raw, read_record
+from fric.excitation import EXCITATIONS
+from fric.excitation.sequence import Sequence
+from fric.model_file import read_model
+from fric.plants import PLANTS
 from fric_nodes.nodes.excitation import ExcitationNode
 from fric_nodes.nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.plant import PlantNode
-from fric_nodes.plants import PLANTS
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile

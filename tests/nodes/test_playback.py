@@ -5,7 +5,7 @@ import threading
 import time
 
 import pytest
-from fric_nodes.bagio import Raw
+from fric.bagio import Raw
 from fric_nodes.nodes.playback import Due, Pace, schedule
 
 SECOND = 1_000_000_000

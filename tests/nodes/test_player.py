@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fric_nodes.bagio import BagWriter, iterate_raw, write_record
-from fric_nodes.bagio.errors import BagError
+from fric.bagio import BagWriter, iterate_raw, write_record
+from fric.bagio.errors import BagError
+from fric.record import Record
 from fric_nodes.nodes.player import NoSubscribersError, PlayerNode
-from fric_nodes.record import Record
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy

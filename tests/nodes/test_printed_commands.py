@@ -106,8 +106,8 @@ def _found(folder: Path) -> None:
 
 def _simulated(folder: Path) -> None:
     """``bags/simulated``: the recording with a little less force."""
-    from fric_nodes.bagio.read import read_record
-    from fric_nodes.bagio.write import write_record
+    from fric.bagio.read import read_record
+    from fric.bagio.write import write_record
 
     record = read_record(folder / "bags" / "slide")
     write_record(replace(record, effort=0.98 * record.effort), folder / "bags" / "simulated")
@@ -115,8 +115,8 @@ def _simulated(folder: Path) -> None:
 
 def _followed(folder: Path) -> None:
     """``bags/my_run``: a recording with its reference."""
-    from fric_nodes.bagio.read import read_record
-    from fric_nodes.bagio.write import write_record
+    from fric.bagio.read import read_record
+    from fric.bagio.write import write_record
 
     record = read_record(folder / "bags" / "contour", end=4.0)
     write_record(replace(record, reference=record.position), folder / "bags" / "my_run")

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
-from fric_nodes.bagio import bag_info, iterate_raw, read_record
+from fric.bagio import bag_info, iterate_raw, read_record
 from fric_nodes.nodes.recorder import RecorderNode
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy

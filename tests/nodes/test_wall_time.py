@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from fric_nodes.control.tuning import tune
-from fric_nodes.model import build_model, term
-from fric_nodes.model_file import write_model
+from fric.control.tuning import tune
+from fric.model import build_model, term
+from fric.model_file import write_model
 from fric_nodes.nodes.compensator import CompensatorNode
 from fric_nodes.nodes.excitation import ExcitationNode
 from fric_nodes.nodes.lean_executor import LeanExecutor

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.simulate import Predictor, Simulator
+from fric.model import Model, Term, build_model, term
+from fric.simulate import Predictor, Simulator
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

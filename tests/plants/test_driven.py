@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.plants import PLANTS
-from fric_nodes.plants.rigid_driven import DRIVEN
-from fric_nodes.simulate import Simulator, predict_force, simulate
+from fric.model import Model, Term, build_model, term
+from fric.plants import PLANTS
+from fric.plants.rigid_driven import DRIVEN
+from fric.simulate import Simulator, predict_force, simulate
 
 SPRING = term("compliance", stiffness=2e4, damping=5.0)
 FRICTION = (term("coulomb", force=2.0), term("stribeck", force=1.0, velocity=0.02))

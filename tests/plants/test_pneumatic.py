@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.model_file import read_model
-from fric_nodes.plants import PLANTS
-from fric_nodes.plants.pneumatic import flow, opening, psi
-from fric_nodes.shared_files import config_file
-from fric_nodes.simulate import Simulator
-from fric_nodes.verification import pneumatic_reference as reference
+from fric.model import Model, Term, build_model, term
+from fric.model_file import read_model
+from fric.plants import PLANTS
+from fric.plants.pneumatic import flow, opening, psi
+from fric.shared_files import config_file
+from fric.simulate import Simulator
+from fric.verification import pneumatic_reference as reference
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

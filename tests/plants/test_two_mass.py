@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.model import Model, Term, build_model, term
-from fric_nodes.plants import PLANTS
-from fric_nodes.simulate import Predictor, Simulator, simulate
+from fric.model import Model, Term, build_model, term
+from fric.plants import PLANTS
+from fric.simulate import Predictor, Simulator, simulate
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from fric_nodes.report.figures import in_parts, thinned
+from fric.report.figures import in_parts, thinned
 
 
 def test_a_line_breaks_where_nothing_was_recorded() -> None:

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.screen import screened
-from fric_nodes.identification.start import start_model
-from fric_nodes.instrument import CHECKS, Evidence
-from fric_nodes.record import Record, RecordError, Units
-from fric_nodes.signals.folds import fold_of, unfolded
+from fric.identification import METHODS
+from fric.identification.result import Options
+from fric.identification.screen import screened
+from fric.identification.start import start_model
+from fric.instrument import CHECKS, Evidence
+from fric.record import Record, RecordError, Units
+from fric.signals.folds import fold_of, unfolded
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.bench.dirty_axis import Axis, Dirt, recorded
-from fric_nodes.record import Record
-from fric_nodes.signals.hold import hold_of, resolved
+from fric.bench.dirty_axis import Axis, Dirt, recorded
+from fric.record import Record
+from fric.signals.hold import hold_of, resolved
 
 AXIS = Axis(2.0, 5.0, 12.0, 0.3)
 CLEAN = Dirt(1000.0, 1, 2e5, 0.0, 0.0, False, "following", 0.01, 0.0, 0.0, 0.0, 0, False, False)

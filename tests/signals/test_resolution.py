@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fric_nodes.signals.instrument_noise import errors_like, level_of
-from fric_nodes.signals.resolution import noise_of, step_of
+from fric.signals.instrument_noise import errors_like, level_of
+from fric.signals.resolution import noise_of, step_of
 
 
 @pytest.mark.parametrize("step", [1e-7, 0.25, 2.0 * np.pi / 4096])

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.identification import METHODS
-from fric_nodes.identification.result import Options
-from fric_nodes.identification.screen import screened
-from fric_nodes.identification.start import start_model
-from fric_nodes.record import Record, Units
-from fric_nodes.signals.conditioning import conditioned
-from fric_nodes.signals.spikes import spikes_of, without_spikes
+from fric.identification import METHODS
+from fric.identification.result import Options
+from fric.identification.screen import screened
+from fric.identification.start import start_model
+from fric.record import Record, Units
+from fric.signals.conditioning import conditioned
+from fric.signals.spikes import spikes_of, without_spikes
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.record import Array, Record
-from fric_nodes.signals.stamps import evened, grid_of, jitter_of, rounded_grid
+from fric.record import Array, Record
+from fric.signals.stamps import evened, grid_of, jitter_of, rounded_grid
 
 RATE = 1000.0
 N = 8000

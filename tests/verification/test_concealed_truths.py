@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from fric_nodes.friction.asperity import AsperityParameters, AsperityPopulation
-from fric_nodes.verification.concealed_asperities import slide
-from fric_nodes.verification.concealed_asymmetry import swing
-from fric_nodes.verification.concealed_bearing import _case as bearing
-from fric_nodes.verification.concealed_compliance import _case as compliance
-from fric_nodes.verification.concealed_presliding import _case as presliding
-from fric_nodes.verification.pneumatic_reference import FRICTION, MASS, slips, surplus
+from fric.friction.asperity import AsperityParameters, AsperityPopulation
+from fric.verification.concealed_asperities import slide
+from fric.verification.concealed_asymmetry import swing
+from fric.verification.concealed_bearing import _case as bearing
+from fric.verification.concealed_compliance import _case as compliance
+from fric.verification.concealed_presliding import _case as presliding
+from fric.verification.pneumatic_reference import FRICTION, MASS, slips, surplus
 from scipy.integrate import solve_ivp
 
 

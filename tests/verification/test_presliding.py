@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fric_nodes.effect import Effect, Place
-from fric_nodes.effects import EFFECTS
-from fric_nodes.engine.kernel import kernel
-from fric_nodes.model import Term, build_model, term
-from fric_nodes.verification import elasto_plastic_drift, passivity, presliding_memory, stick_slip
+from fric.effect import Effect, Place
+from fric.effects import EFFECTS
+from fric.engine.kernel import kernel
+from fric.model import Term, build_model, term
+from fric.verification import elasto_plastic_drift, passivity, presliding_memory, stick_slip
 
 
 @kernel

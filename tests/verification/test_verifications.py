@@ -6,13 +6,13 @@ import importlib
 import math
 import pkgutil
 
-import fric_nodes.verification
+import fric.verification
 import plotly.graph_objects as go
 import pytest
-from fric_nodes.bench.benchmark import Figure
-from fric_nodes.report.verification import verification_page
-from fric_nodes.verification import VERIFICATIONS
-from fric_nodes.verification.verification import Evidence, Verification
+from fric.bench.benchmark import Figure
+from fric.report.verification import verification_page
+from fric.verification import VERIFICATIONS
+from fric.verification.verification import Evidence, Verification
 
 _LONG = {
     "amthor",
@@ -49,8 +49,8 @@ def test_it_reaches_its_goals(name: str) -> None:
 
 
 def test_every_module_of_the_folder_is_in_the_catalogue() -> None:
-    modules = {info.name for info in pkgutil.iter_modules(fric_nodes.verification.__path__)}
-    defining = {name for name in modules if hasattr(importlib.import_module(f"fric_nodes.verification.{name}"), "VERIFICATION")}
+    modules = {info.name for info in pkgutil.iter_modules(fric.verification.__path__)}
+    defining = {name for name in modules if hasattr(importlib.import_module(f"fric.verification.{name}"), "VERIFICATION")}
     assert len(defining) == len(VERIFICATIONS)
 
 

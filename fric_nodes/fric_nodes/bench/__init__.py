@@ -1,14 +1,1 @@
-"""Benchmarks that a user can run with ``fric bench``: one file each, with a constant ``BENCHMARK``.
-
-Every figure of speed in the README comes from here.
-"""
-
-from __future__ import annotations
-
-from ..registry import discover
-from .benchmark import Benchmark
-
-__all__ = ["BENCHMARKS", "Benchmark"]
-
-BENCHMARKS: dict[str, Benchmark] = {benchmark.id: benchmark for benchmark in discover(__name__, "BENCHMARK", Benchmark)}
-"""Every benchmark by its id."""
+"""Benchmarks that need the ROS graph; ``fric bench`` finds them as it finds those of a plugin."""

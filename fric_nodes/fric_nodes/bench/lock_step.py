@@ -6,9 +6,10 @@ import re
 import tempfile
 from pathlib import Path
 
-from ..demo.graph import Graph, NodeSetup, free_domain
-from ..shared_files import config_file
-from .benchmark import Benchmark, Figure
+from fric.bench.benchmark import Benchmark, Figure
+from fric.shared_files import config_file
+
+from fric_nodes.demo.graph import Graph, NodeSetup, free_domain
 
 __all__ = ["BENCHMARK"]
 

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from fric.errors import InputError
 
-from ..errors import InputError
 from .options import JsonOption, progress
 
 if TYPE_CHECKING:
-    from ..bench import Benchmark
+    from fric.bench import Benchmark
 
 __all__ = ["register"]
 
@@ -31,10 +31,9 @@ def bench(
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed on this machine; exit status 1 when a goal is missed."""
+    from fric.bench import BENCHMARKS
     from rich.console import Console
     from rich.table import Table
-
-    from ..bench import BENCHMARKS
 
     if listed:
         _list(list(BENCHMARKS.values()), as_json)

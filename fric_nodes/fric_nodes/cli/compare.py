@@ -47,9 +47,9 @@ def compare(
     as_json: JsonOption = False,
 ) -> None:
     """Align two recordings in time and say by how much and where they differ; writes report.html and report.json."""
-    from ..diagnosis.compare import compare as align
-    from ..files import write_text
-    from ..report.compare import comparison_report
+    from fric.diagnosis.compare import compare as align
+    from fric.files import write_text
+    from fric.report.compare import comparison_report
 
     reading = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
     progress("reading 2 recordings")

@@ -27,7 +27,7 @@ def demo(
     as_json: JsonOption = False,
 ) -> None:
     """Excite, record, identify and compensate an axis whose friction the identifier doesn't know, over real ROS 2 topics."""
-    from ..demo.run import DemoSettings, run_demo
+    from fric_nodes.demo.run import DemoSettings, run_demo
 
     start = clock_of_wall.monotonic()
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from fric.errors import InputError
 
-from ..errors import InputError
 from .options import (
     EndOption,
     JointOption,
@@ -24,8 +24,8 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..diagnosis import Diagnosis
-    from ..record import Record
+    from fric.diagnosis import Diagnosis
+    from fric.record import Record
 
 __all__ = ["register", "write_diagnosis"]
 
@@ -59,10 +59,10 @@ def diagnose(
     as_json: JsonOption = False,
 ) -> None:
     """Find what physics a model leaves out, and write report.html, report.json, model.yaml and prediction.csv."""
-    from ..diagnosis import diagnose as find
-    from ..diagnosis.blocks import in_blocks
-    from ..identification.force_needed import require_force
-    from ..model_file import read_model
+    from fric.diagnosis import diagnose as find
+    from fric.diagnosis.blocks import in_blocks
+    from fric.identification.force_needed import require_force
+    from fric.model_file import read_model
 
     given = validate or []
     same = {path.resolve() for path in train} & {path.resolve() for path in given}
@@ -86,9 +86,9 @@ def diagnose(
 
 def write_diagnosis(out: Path, found: Diagnosis, train: list[Record], validation: list[Record]) -> None:
     """Every result, or none: all are made before the first is written."""
-    from ..files import write_text
-    from ..model_file import write_model
-    from ..report.diagnosis import diagnosis_report
+    from fric.files import write_text
+    from fric.model_file import write_model
+    from fric.report.diagnosis import diagnosis_report
 
     page = diagnosis_report(found, train, validation)
     table = _csv(found)

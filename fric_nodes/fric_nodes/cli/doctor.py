@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from fric.errors import InputError
 
-from ..errors import InputError
 from .options import EndOption, JointOption, JsonOption, RepairOption, StartOption, TimeOption, TopicOption, progress
 
 if TYPE_CHECKING:
-    from ..instrument import Finding
-    from ..record import Record
+    from fric.instrument import Finding
+    from fric.record import Record
 
 __all__ = ["register"]
 
@@ -47,8 +47,9 @@ def doctor(
         return
     if gear_ratio is not None and not 0.0 < gear_ratio < float("inf"):
         raise InputError("--gear-ratio", f"is {gear_ratio}", "give a positive number")
-    from ..instrument import inspect
-    from ..model_file import read_model
+    from fric.instrument import inspect
+    from fric.model_file import read_model
+
     from .options import ReadOptions, read_all
 
     records = read_all(recordings, ReadOptions(joint, repair, time, start, end, tuple(topic or ())))
@@ -66,10 +67,9 @@ def doctor(
 
 
 def _print_findings(findings: tuple[Finding, ...], names: list[str], records: list[Record]) -> None:
+    from fric.report.checks import checks_rows, checks_sentence
     from rich.console import Console
     from rich.table import Table
-
-    from ..report.checks import checks_rows, checks_sentence
 
     shown = Table(box=None, pad_edge=False)
     for column in ("check", "verdict", "recording", "value", "what was found"):

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from fric.errors import InputError
 
-from ..errors import InputError
 from .identify_joints import ALL, identify_each
 from .identify_method import method_of
 from .identify_shown import print_design, print_intervals, print_result, summary_of, uncertainty_json
@@ -29,12 +29,12 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..identification.design import Limits, Rig
-    from ..identification.identifiability import Foreseen
-    from ..identification.result import Identification, Method, Options
-    from ..instrument import Finding
-    from ..model import Model
-    from ..record import Record
+    from fric.identification.design import Limits, Rig
+    from fric.identification.identifiability import Foreseen
+    from fric.identification.result import Identification, Method, Options
+    from fric.instrument import Finding
+    from fric.model import Model
+    from fric.record import Record
 
 __all__ = ["register"]
 
@@ -131,9 +131,9 @@ def identify(
 ) -> None:
     """Identify a model's parameters from recordings and write model.yaml, identification.json and report.html."""
     asked = dict(locals())
-    from ..identification.equations import nominal_conditions
-    from ..identification.force_needed import require_force
-    from ..identification.result import Options
+    from fric.identification.equations import nominal_conditions
+    from fric.identification.force_needed import require_force
+    from fric.identification.result import Options
 
     _check(cutoff, decimation, rest_velocity, horizon, starts, tries)
     given = train or []
@@ -165,7 +165,7 @@ def identify(
     result = replace(_fit(chosen, structure, records, validation, options, experiments=not design), checks=checks)
     summary = summary_of(result)
     if uncertainty:
-        from ..identification.uncertainty import assess
+        from fric.identification.uncertainty import assess
 
         progress(f"finding intervals by {uncertainty}")
         found = assess(result, records, options, uncertainty)
@@ -227,7 +227,7 @@ def _bounds(given: list[str]) -> tuple[tuple[str, float, float], ...]:
 
 def _limits(design: bool, given: list[str], duration: float | None) -> Limits | None:
     """The limits of the next recording, or None when none is asked for."""
-    from ..identification.design import Limits
+    from fric.identification.design import Limits
 
     if not design:
         if given or duration is not None:
@@ -238,7 +238,7 @@ def _limits(design: bool, given: list[str], duration: float | None) -> Limits | 
 
 def _rig(given: list[str]) -> Rig:
     """How the next recording is made, from texts such as ``resolution=1e-6``."""
-    from ..identification.design import Rig
+    from fric.identification.design import Rig
 
     found = {"period": _PERIOD}
     for text in given:
@@ -261,8 +261,8 @@ def _refuse_overlap(train: list[Path], validation: list[Path]) -> None:
 
 def _structure(model: Path | None, terms: str, record: Record) -> Model:
     """The model to fit: from a file, or from a list of effects with start values of one."""
-    from ..identification.start import start_model
-    from ..model_file import read_model
+    from fric.identification.start import start_model
+    from fric.model_file import read_model
 
     if model is not None:
         return replace(read_model(model), joint=record.joint, standard_errors={}, provenance={})
@@ -272,7 +272,7 @@ def _structure(model: Path | None, terms: str, record: Record) -> Model:
 
 def _inspect(records: list[Record]) -> tuple[Finding, ...]:
     """What is wrong with the recordings themselves, said before anything is fitted."""
-    from ..instrument import inspect
+    from fric.instrument import inspect
 
     progress("looking for faults of the recordings")
     findings = inspect(records)
@@ -284,7 +284,7 @@ def _inspect(records: list[Record]) -> tuple[Finding, ...]:
 
 def _foresee(structure: Model, records: list[Record], options: Options, method: Method, experiments: bool) -> Foreseen | None:
     """What the recordings can tell, said before the fit; None where the method sees something else, or nothing can be said."""
-    from ..identification.identifiability import foresee
+    from fric.identification.identifiability import foresee
 
     if not method.predicts:
         return None
@@ -306,7 +306,7 @@ def _fit(
     options: Options,
     experiments: bool,
 ) -> Identification:
-    from ..identification.misfit import validated
+    from fric.identification.misfit import validated
 
     foreseen = _foresee(structure, records, options, method, experiments)
     progress(f"fitting {', '.join(structure.names)} by {method.id}")
@@ -329,8 +329,8 @@ def _write(
     summary: dict[str, Any],
 ) -> None:
     """Every result, or none: all are made before the first is written."""
-    from ..files import write_text
-    from ..model_file import write_model
+    from fric.files import write_text
+    from fric.model_file import write_model
 
     attachments = result.attachments
     page = result.page(records, validation, options)
@@ -345,7 +345,7 @@ def _design_alone(
     path: Path | None, limits: Limits | None, rig: Rig, method: Method, options: Options, out: Path, as_json: bool, tries: int
 ) -> None:
     """A design without recordings, from the values of a model file."""
-    from ..model_file import read_model
+    from fric.model_file import read_model
 
     if limits is None:
         raise InputError("fric identify", "no recording is given", "name one, or design the first with --design and --model")
@@ -369,9 +369,9 @@ def _design(
     tries: int,
 ) -> dict[str, Any]:
     """Propose the next excitation, and write design.json, excitation.yaml and design.html."""
-    from ..files import write_text
-    from ..identification.design import problem_for, propose, rig_of
-    from ..report.design import design_report
+    from fric.files import write_text
+    from fric.identification.design import problem_for, propose, rig_of
+    from fric.report.design import design_report
 
     if not method.predicts:
         raise InputError("--design", f"not to be had for the method '{method.id}'", "use inverse-dynamics or prediction-error")

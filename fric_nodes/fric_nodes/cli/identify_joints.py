@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import typer
+from fric.errors import InputError
 
-from ..errors import InputError
 from .options import ReadOptions, progress
 
 __all__ = ["ALL", "identify_each"]
@@ -49,9 +49,9 @@ def identify_each(
     Raises:
         InputError: no joint could be identified.
     """
-    from ..bagio.read import joint_list
-    from ..files import write_text
-    from ..report.joints import joints_overview
+    from fric.bagio.read import joint_list
+    from fric.files import write_text
+    from fric.report.joints import joints_overview
 
     out, as_json = Path(asked["out"]), bool(asked["as_json"])
     topics = reading.topic_names()

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from fric.errors import InputError
 
 if TYPE_CHECKING:
-    from ..identification.result import Method
-    from ..model import Model
+    from fric.identification.result import Method
+    from fric.model import Model
 
 __all__ = ["method_of"]
 
@@ -19,7 +19,7 @@ def method_of(name: str | None, structure: Model | None = None) -> Method:
     The filters of inverse dynamics take pre-sliding for inertia and damping: these were off by up to 5 standard errors where
     it was tried (2 kg, 2e5 N/m, steps of 10 um).
     """
-    from ..identification import METHODS
+    from fric.identification import METHODS
 
     slips = structure is not None and structure.has_slip_dynamics
     if name == "inverse-dynamics" and slips:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..identification.design import Proposal
-    from ..identification.result import Identification, Score
-    from ..identification.uncertainty import Uncertainty
-    from ..model import Model
+    from fric.identification.design import Proposal
+    from fric.identification.result import Identification, Score
+    from fric.identification.uncertainty import Uncertainty
+    from fric.model import Model
 
 __all__ = ["print_design", "print_intervals", "print_result", "summary_of", "uncertainty_json"]
 

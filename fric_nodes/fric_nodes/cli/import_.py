@@ -42,9 +42,9 @@ def import_(
     output, held from its stamp to the next), preceding or mean (over the sample before), linear (a continuous force), or
     unknown (the default: fits find it from the motion).
     """
-    from ..bagio.importing import import_recording
-    from ..bagio.mapping import load_mapping
-    from ..bagio.write import write_record
+    from fric.bagio.importing import import_recording
+    from fric.bagio.mapping import load_mapping
+    from fric.bagio.write import write_record
 
     record = import_recording(file, load_mapping(mapping), repair=repair)
     write_record(record, out, storage=storage.value)

@@ -7,8 +7,7 @@ import pkgutil
 import sys
 
 import typer
-
-from ..errors import InputError
+from fric.errors import InputError
 
 __all__ = ["build_app", "main"]
 

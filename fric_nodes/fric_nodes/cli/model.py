@@ -26,7 +26,7 @@ def register(app: typer.Typer) -> None:
 
 def schema() -> None:
     """Print the JSON schema of model files."""
-    from ..model_file import json_schema
+    from fric.model_file import json_schema
 
     typer.echo(json.dumps(json_schema(), indent=2))
 
@@ -36,10 +36,9 @@ def show(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Print the equations and values of a model file."""
+    from fric.model_file import read_model
     from rich.console import Console
     from rich.table import Table
-
-    from ..model_file import read_model
 
     model = read_model(file)
     rows = [
@@ -82,10 +81,10 @@ def effects(
     names: Annotated[list[str] | None, typer.Argument(help="Which effects, with all there is to know; all in short.")] = None,
 ) -> None:
     """List the effects that a model can hold."""
-    from ..effects import EFFECTS
-    from ..errors import InputError
-    from ..parameter import Parameter
-    from ..record import Units
+    from fric.effects import EFFECTS
+    from fric.errors import InputError
+    from fric.parameter import Parameter
+    from fric.record import Units
 
     if not names:
         _list(
@@ -117,7 +116,7 @@ def effects(
 
 def plants() -> None:
     """List the plants that a model can have."""
-    from ..plants import PLANTS
+    from fric.plants import PLANTS
 
     _list(
         ("plant", "equation", "source", "measures besides"),
@@ -127,7 +126,7 @@ def plants() -> None:
 
 def excitations() -> None:
     """List the excitations that the node ``excitation`` can run."""
-    from ..excitation import EXCITATIONS
+    from fric.excitation import EXCITATIONS
 
     _list(
         ("excitation", "shows", "parameters"),
@@ -137,7 +136,7 @@ def excitations() -> None:
 
 def methods() -> None:
     """List the methods of identification, and the experiment that each of them needs."""
-    from ..identification import METHODS
+    from fric.identification import METHODS
 
     _list(("method", "needs", "source"), ((key, method.needs, method.source) for key, method in METHODS.items()))
 

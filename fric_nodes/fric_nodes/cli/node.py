@@ -7,8 +7,7 @@ import sys
 from typing import Annotated
 
 import typer
-
-from ..errors import InputError
+from fric.errors import InputError
 
 __all__ = ["NODES", "register"]
 

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-
-from ..errors import InputError
+from fric.errors import InputError
 
 if TYPE_CHECKING:
-    from ..bagio.topics import Topics
-    from ..record import Record
+    from fric.bagio.topics import Topics
+    from fric.record import Record
 
 __all__ = [
     "EndOption",
@@ -69,7 +68,7 @@ class ReadOptions:
         Raises:
             InputError: not ROLE=NAME, or no such role.
         """
-        from ..bagio.topics import Topics
+        from fric.bagio.topics import Topics
 
         names = {}
         for entry in self.topics:
@@ -87,8 +86,8 @@ def read_all(paths: list[Path], options: ReadOptions) -> list[Record]:
     Raises:
         InputError: one of them can't be used.
     """
-    from ..bagio.read import read_record
-    from ..identification.screen import screened
+    from fric.bagio.read import read_record
+    from fric.identification.screen import screened
 
     if options.time not in {"stamp", "log"}:
         raise InputError("--time", f"'{options.time}' is not known", "use stamp or log")

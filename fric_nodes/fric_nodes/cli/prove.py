@@ -34,9 +34,9 @@ def prove(
     as_json: JsonOption = False,
 ) -> None:
     """Examine the diagnosis; exit status 1 when a goal is missed. A run that was stopped goes on in the same folder."""
-    from ..diagnosis.prove.examination import hold
-    from ..files import write_text
-    from ..report.prove import prove_page
+    from fric.diagnosis.prove.examination import hold
+    from fric.files import write_text
+    from fric.report.prove import prove_page
 
     held = hold(cases, seed, out, variant=variant, jobs=jobs, progress=progress)
     name = "" if variant == "standard" else f" --variant {variant}"

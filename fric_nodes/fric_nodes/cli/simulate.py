@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
+from fric.errors import InputError
 
-from ..errors import InputError
 from .options import (
     EndOption,
     JointOption,
@@ -23,8 +23,8 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..model import Model
-    from ..record import Record
+    from fric.model import Model
+    from fric.record import Record
 
 __all__ = ["register"]
 
@@ -64,7 +64,7 @@ def simulate(
     It starts in the recorded state and is compared with the recorded motion. In a free run the recorded position becomes the
     reference of the new bag.
     """
-    from ..model_file import read_model
+    from fric.model_file import read_model
 
     if (force is None) == (closed_loop is None) or (closed_loop is None) != (reference is None):
         raise InputError(
@@ -96,11 +96,10 @@ def _recorded(path: Path, options: ReadOptions, model: Model) -> Record:
 
 def _free_run(held: Model, model: Path, force: Path, record: Record, out: Path) -> _Shown:
     import numpy as np
-
-    from .. import simulate as simulation
-    from ..bagio.write import write_record
-    from ..identification.equations import surroundings
-    from ..signals.initial_state import initial_state
+    from fric import simulate as simulation
+    from fric.bagio.write import write_record
+    from fric.identification.equations import surroundings
+    from fric.signals.initial_state import initial_state
 
     begin = initial_state(record.time, record.position)
     load, temperature = (each[:-1] if each.shape[0] > 1 else each for each in surroundings(record))
@@ -139,9 +138,9 @@ def _free_run(held: Model, model: Path, force: Path, record: Record, out: Path) 
 
 
 def _in_closed_loop(held: Model, model: Path, controller: Path, record: Record, out: Path) -> _Shown:
-    from ..bagio.write import write_record
-    from ..control.closed_loop import closed_loop
-    from ..control.controller_file import read_controller
+    from fric.bagio.write import write_record
+    from fric.control.closed_loop import closed_loop
+    from fric.control.controller_file import read_controller
 
     found = closed_loop(held, read_controller(controller), record)
     note = f"simulated from {model} in closed loop with {controller} under the reference of {record.source}"

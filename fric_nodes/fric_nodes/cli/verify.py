@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from fric.errors import InputError
 
-from ..errors import InputError
 from .options import JsonOption, progress
 
 __all__ = ["register"]
@@ -25,9 +25,9 @@ def verify(
     as_json: JsonOption = False,
 ) -> None:
     """Verify the physics; exit status 1 when a goal is missed."""
-    from ..files import write_text
-    from ..report.verification import goal, quantity, verification_page
-    from ..verification import VERIFICATIONS
+    from fric.files import write_text
+    from fric.report.verification import goal, quantity, verification_page
+    from fric.verification import VERIFICATIONS
 
     chosen = names or list(VERIFICATIONS)
     for name in chosen:

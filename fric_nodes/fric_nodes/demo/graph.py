@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from ..errors import InputError
+from fric.errors import InputError
 
 __all__ = ["Graph", "GraphError", "NodeSetup", "free_domain"]
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from ..bagio import read_record, read_series
-from ..record import Array, Record, RecordError
+from fric.bagio import read_record, read_series
+from fric.record import Array, Record, RecordError
 
 __all__ = ["Run", "read_run"]
 

@@ -10,20 +10,21 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..control.pid import PidGains
-from ..control.tuning import LoopMargins, tune
-from ..errors import InputError
-from ..files import write_text
-from ..identification import METHODS
-from ..identification.result import Identification, Options
-from ..identification.scoring import score
-from ..identification.screen import screened
-from ..model_file import read_model, write_model
-from ..report.demo import DemoOutcome, demo_report
-from ..report.picture import write_picture
-from ..shared_files import config_file
+from fric.control.pid import PidGains
+from fric.control.tuning import LoopMargins, tune
+from fric.errors import InputError
+from fric.files import write_text
+from fric.identification import METHODS
+from fric.identification.result import Identification, Options
+from fric.identification.scoring import score
+from fric.identification.screen import screened
+from fric.model_file import read_model, write_model
+from fric.shared_files import config_file
+
 from .graph import Graph, NodeSetup, free_domain
 from .outcome import Run, read_run
+from .picture import write_picture
+from .report import DemoOutcome, demo_report
 
 __all__ = ["DemoSettings", "run_demo"]
 
@@ -55,7 +56,7 @@ class DemoSettings:
 
 def identify(bag: Path) -> Identification:
     """The model found in ``bag``, from nothing but the recording."""
-    from ..bagio.read import read_record
+    from fric.bagio.read import read_record
 
     record = screened(read_record(bag, repair=True))
     return METHODS["prediction-error"].fit(read_model(config_file("start_model.yaml")), [record], Options())

@@ -6,13 +6,14 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from fric.control.feedforward import Feedforward
+from fric.errors import InputError
+from fric.model import Model
+from fric.model_file import read_model
+
 from fric_interfaces.msg import FrictionModel, Reference
 from fric_interfaces.srv import LoadModel
 
-from ..control.feedforward import Feedforward
-from ..errors import InputError
-from ..model import Model
-from ..model_file import read_model
 from .base import LOCK_STEP, PERIOD, LoopNode
 from .convert import MessageError, model_from_message
 from .forces import STAMPED, ForcePublisher, ReferencePoint, reference_in

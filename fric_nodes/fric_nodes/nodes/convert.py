@@ -6,15 +6,14 @@ import math
 from typing import Any, NamedTuple
 
 from builtin_interfaces.msg import Time
+from fric.effects import by_name
+from fric.model import Model, ModelError, Term, build_model
+from fric.parameter import Parameter
+from fric.plants import PLANTS
+from fric.record import Units
 from sensor_msgs.msg import JointState
 
 from fric_interfaces.msg import FrictionModel, FrictionParameter, FrictionTerm
-
-from ..effects import by_name
-from ..model import Model, ModelError, Term, build_model
-from ..parameter import Parameter
-from ..plants import PLANTS
-from ..record import Units
 
 __all__ = [
     "JointSample",

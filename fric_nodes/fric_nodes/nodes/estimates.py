@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from fric.identification.online import Estimate
+from fric.model import Model
+
 from fric_interfaces.msg import FrictionEstimate
 
-from ..identification.online import Estimate
-from ..model import Model
 from .convert import set_stamp
 
 __all__ = ["estimate_to_message", "well_determined"]

@@ -11,14 +11,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from fric.excitation import EXCITATIONS
+from fric.excitation.sequence import Sequence
+from fric.excitation_kind import OUTPUTS, ExcitationError
+from fric.record import Units
 from sensor_msgs.msg import JointState
 
 from fric_interfaces.msg import Reference
 
-from ..excitation import EXCITATIONS
-from ..excitation.sequence import Sequence
-from ..excitation_kind import OUTPUTS, ExcitationError
-from ..record import Units
 from .base import LOCK_STEP, PERIOD, LoopNode, wall_clock
 from .convert import MessageError, from_seconds, joint_sample, nanoseconds, set_stamp
 from .forces import STAMPED, ForcePublisher

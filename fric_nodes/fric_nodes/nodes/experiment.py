@@ -14,14 +14,14 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from fric.experiment.conductor import Conductor, Outcome, Waiting
+from fric.experiment.knowledge import Knowledge
+from fric.experiment.motion import Cut, Drive, ExperimentError, Sample
+from fric.experiment.results import write_results, write_run
+from fric.experiment.settings import KINDS, NUMBERS, bounds_of, timing_of
+from fric.record import Units
 from sensor_msgs.msg import JointState
 
-from ..experiment.conductor import Conductor, Outcome, Waiting
-from ..experiment.knowledge import Knowledge
-from ..experiment.motion import Cut, Drive, ExperimentError, Sample
-from ..experiment.results import write_results, write_run
-from ..experiment.settings import KINDS, NUMBERS, bounds_of, timing_of
-from ..record import Units
 from .base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent
 from .convert import JointSample, MessageError, joint_sample
 from .experiment_drive import ControllerDrive, ForceDrive, Output

@@ -11,6 +11,7 @@ import math
 import time
 from typing import Protocol
 
+from fric.experiment.motion import Drive, ExperimentError, Law, Sample
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -18,7 +19,6 @@ from rclpy.task import Future
 
 from fric_interfaces.msg import Reference
 
-from ..experiment.motion import Drive, ExperimentError, Law, Sample
 from .base import LoopNode
 from .convert import set_stamp
 from .forces import ForcePublisher

@@ -10,6 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from fric.errors import InputError
+from fric.identification.online import ESTIMATORS, State, make_estimator
+from fric.identification.result import Options
+from fric.identification.start import start_model
+from fric.model import Model
+from fric.model_file import read_model, write_model
+from fric.record import Units
 from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
@@ -17,13 +24,6 @@ from sensor_msgs.msg import JointState
 from fric_interfaces.msg import FrictionEstimate, FrictionModel
 from fric_interfaces.srv import FreezeIdentification, ResetIdentification, SaveIdentification, StartIdentification
 
-from ..errors import InputError
-from ..identification.online import ESTIMATORS, State, make_estimator
-from ..identification.result import Options
-from ..identification.start import start_model
-from ..model import Model
-from ..model_file import read_model, write_model
-from ..record import Units
 from .bulk import BulkSubscription
 from .convert import MessageError, joint_sample, model_to_message
 from .estimates import estimate_to_message, well_determined

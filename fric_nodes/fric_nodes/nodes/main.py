@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable
 
 import rclpy
+from fric.errors import InputError
 from rclpy.executors import ExternalShutdownException
 
-from ..errors import InputError
 from .base import LoopNode
 from .lean_executor import LeanExecutor
 

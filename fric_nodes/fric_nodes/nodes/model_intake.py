@@ -6,11 +6,10 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
+from fric.control.feedforward import prepare
+from fric.model import Model
 from rclpy.node import Node
 from rclpy.task import Future
-
-from ..control.feedforward import prepare
-from ..model import Model
 
 __all__ = ["ModelIntake"]
 

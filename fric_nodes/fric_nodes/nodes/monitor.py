@@ -1,6 +1,6 @@
 """Watches the machine while it runs: joint states and commands in, a mismatch out when the machine no longer is its model.
 
-The watch itself (:mod:`fric_nodes.diagnosis.watch`) is a few microseconds per sample. Which component changed takes seconds of
+The watch itself (:mod:`fric.diagnosis.watch`) is a few microseconds per sample. Which component changed takes seconds of
 processor time, and before it is first asked a compilation: a process of its own does both, so that no sample waits for it.
 """
 
@@ -17,18 +17,18 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from fric.diagnosis.suspects import Suspects, prepare_suspects, suspects
+from fric.diagnosis.watch import Phase, Watch, WatchSettings
+from fric.model_file import model_from_text, model_to_text, read_model
+from fric.record import Record
+from fric.shared_files import config_file
+from fric.threads import end_with_parent
 from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from fric_interfaces.msg import Mismatch
 
-from ..diagnosis.suspects import Suspects, prepare_suspects, suspects
-from ..diagnosis.watch import Phase, Watch, WatchSettings
-from ..model_file import model_from_text, model_to_text, read_model
-from ..record import Record
-from ..shared_files import config_file
-from ..threads import end_with_parent
 from .bulk import BulkSubscription
 from .convert import MessageError, joint_sample, set_stamp
 from .orderly import OrderlyNode, run

@@ -13,11 +13,10 @@ import threading
 from collections.abc import Callable
 
 import rclpy
+from fric.errors import InputError
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-
-from ..errors import InputError
 
 __all__ = ["OrderlyNode", "run"]
 

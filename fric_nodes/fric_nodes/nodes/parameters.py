@@ -12,14 +12,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fric.errors import InputError
+from fric.parameter import Parameter
+from fric.record import Units
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
-
-from ..errors import InputError
-from ..parameter import Parameter
-from ..record import Units
 
 __all__ = ["NodeParameter", "NodeParameterError", "Settings", "from_declaration"]
 

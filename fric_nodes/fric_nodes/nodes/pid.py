@@ -11,12 +11,12 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from fric.control.pid import Pid, PidGains
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from fric_interfaces.msg import Reference, StampedForce
 
-from ..control.pid import Pid, PidGains
 from .base import LOCK_STEP, PERIOD, LoopNode
 from .convert import JointSample, MessageError, from_seconds, joint_sample
 from .forces import STAMPED, ForcePublisher, ReferencePoint, force_in, force_type, reference_in

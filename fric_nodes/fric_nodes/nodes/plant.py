@@ -17,15 +17,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from fric.axis import SimulatedAxis
+from fric.errors import InputError
+from fric.model_file import read_model
+from fric.shared_files import config_file
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from fric_interfaces.msg import StampedForce
 
-from ..axis import SimulatedAxis
-from ..errors import InputError
-from ..model_file import read_model
-from ..shared_files import config_file
 from .base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent, wall_clock
 from .convert import MessageError, from_seconds, set_stamp
 from .forces import STAMPED, ForcePublisher, force_in, force_type

@@ -13,10 +13,10 @@ from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from fric.bagio.topics import Raw
 from rosbags.interfaces import Qos
 from rosbags.rosbag2 import Reader, ReaderError
 
-from ..bagio.topics import Raw
 from .message_order import header_stamp
 
 __all__ = ["Due", "Pace", "recorded_qos", "schedule"]

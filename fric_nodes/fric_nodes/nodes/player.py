@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from builtin_interfaces.msg import Time
+from fric.bagio.errors import BagError
+from fric.bagio.read import bag_info, iterate_raw
+from fric.errors import InputError
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Qos
 from rosgraph_msgs.msg import Clock
 
-from ..bagio.errors import BagError
-from ..bagio.read import bag_info, iterate_raw
-from ..errors import InputError
 from .base import wait_until_sent
 from .bulk import message_class
 from .orderly import OrderlyNode, run

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from fric.bagio.errors import WriteError
+from fric.bagio.padding import PaddingEraser
+from fric.bagio.types import type_fields
+from fric.bagio.write import BagWriter
 from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from ..bagio.errors import WriteError
-from ..bagio.padding import PaddingEraser
-from ..bagio.types import type_fields
-from ..bagio.write import BagWriter
 from .bulk import BulkSubscription, message_class, offered_qos
 from .message_order import ReceiveOrder, StampOrder, TopicIntake
 from .orderly import OrderlyNode, run

@@ -1,7 +1,7 @@
 """Pairing positions with efforts, from streams that say in different ways when an effort acts; no ROS in here.
 
 The identifier wants for each position the effort at its stamp; where an effort is constant from one stamp to the next, that is
-the mean of the interval before and the interval after (as in :mod:`fric_nodes.identification.equations`). A joint state may
+the mean of the interval before and the interval after (as in :mod:`fric.identification.equations`). A joint state may
 carry the effort of the interval before it, of the interval after it, or a sampled continuous signal; or it carries none, and
 the force command has to serve: by its stamp in lock-step, by the time of reception otherwise (the last one before the state,
 held).

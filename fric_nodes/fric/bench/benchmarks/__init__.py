@@ -1,0 +1,1 @@
+"""The benchmarks: one per file, found by being here (a constant ``BENCHMARK``)."""

@@ -1,0 +1,399 @@
+"""Forced harmonic oscillation: mass, damping, stiffness and friction from steady runs under a sinusoidal force.
+
+With F_1, Q_1 the first harmonics (complex, of e^{j w t}) of force and position in the steady state, and R = F_1/Q_1, which is
+(B/C) e^{j phi} where F = B sin(w t) makes the position C sin(w t - phi),
+
+    R = k - m w^2 + j w (c + D) + P + F_C S_1/Q_1 + D_v V_1/Q_1,
+
+S_1 and V_1 being the first harmonics of sgn(v) and |v| along the motion as it was measured: of a sine S_1/Q_1 = 4 j/(pi C), the
+describing function of dry friction; taken from the motion itself, it stays exact when friction bends the sine. P and D are
+those of a feedback that is not part of the force, if there is one. The means give the constant part, with Q_0, S_0, V_0,
+
+    F_0 = k (Q_0 - q_0) + b + F_C S_0 + D_v V_0 .
+
+All this is linear in the parameters: least squares over all runs, each weighted by how well its own periods agree. Corrected
+in the printed slide: its damping formula needs D_i w_i in place of D_i; where its mass is concerned it holds for different w_i
+only; and dry friction is missing there, so that its c holds what friction takes at that amplitude.
+
+A body that rests for part of every period has an open friction there: such runs are refused. Runs must differ in frequency
+(for mass and stiffness), and in frequency or amplitude (for viscous and dry friction).
+
+Source: de Marchi 1998 (forced harmonic oscillation, pseudo-forced parametric oscillation); the terms of friction derived here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import signal
+from scipy.optimize import minimize_scalar
+
+from ...model import Model
+from ...record import Array, Mask, Record
+from ..conclusion import Fitted, concluded
+from ..equations import equations
+from ..free_parameters import FreeParameters
+from ..mechanics import Mechanics
+from ..oscillation_effort import at_stamps
+from ..result import Identification, IdentificationError, Method, Options
+
+__all__ = [
+    "METHOD",
+    "MOST_RESTING",
+    "Forced",
+    "Harmonics",
+    "fit",
+    "forced_mechanics",
+    "forced_response",
+    "harmonics_of",
+    "main_frequency",
+]
+
+_FEWEST = 4  # periods
+_APART = 0.02  # relative difference of frequencies that tells a mass from a spring
+_STEADY = 0.02  # relative difference of a period's amplitude from the later ones' that counts as steady
+MOST_RESTING = 0.05
+"""Part of the time at rest from which on a forced run is refused: it leaves sgn(v) open."""
+_COLUMNS = ("mass", "viscous.coefficient", "stiffness.stiffness", "coulomb.force", "asymmetry.coefficient", "constant")
+
+
+@dataclass(frozen=True, eq=False)
+class Forced:
+    """Response of an axis to a sinusoidal force.
+
+    Attributes:
+        frequency: w [rad/s].
+        amplitude: C of the position [x].
+        stiff: R cos phi [F/x].
+        lossy: R sin phi [F/x].
+        covariance: of ``stiff`` and ``lossy``, shape ``(2, 2)``.
+    """
+
+    frequency: float
+    amplitude: float
+    stiff: float
+    lossy: float
+    covariance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Harmonics:
+    """Means and first harmonics of the steady periods of one run, each of shape ``(n_periods,)``, complex where a harmonic.
+
+    Attributes:
+        frequency: w [rad/s].
+        force: F_1 [F].
+        position: Q_1 [x].
+        sign: S_1 [1].
+        speed: V_1 [x/s].
+        means: of force, position, sgn(v) and |v|, shape ``(n_periods, 4)``.
+        resting: part of the time in which the body rests [1].
+        source: the recording's file.
+        left_out: time before it was steady [s].
+    """
+
+    frequency: float
+    force: np.ndarray
+    position: np.ndarray
+    sign: np.ndarray
+    speed: np.ndarray
+    means: Array
+    resting: float
+    source: str
+    left_out: float
+
+
+def main_frequency(record: Record) -> float:
+    """Frequency of the strongest line in the position [rad/s], refined by least squares.
+
+    Raises:
+        IdentificationError: the joint doesn't move, or moves for less than two periods of it.
+    """
+    even = record.uniform()
+    # A transient swings at another frequency: it is the later half that counts.
+    even = even.slice(even.n_samples // 2, even.n_samples)
+    position = even.position - np.mean(even.position)
+    if not np.any(position):
+        raise IdentificationError(record.source, "the joint does not move", "force it harder")
+    spectrum = np.abs(np.fft.rfft(position * np.hanning(position.shape[0])))
+    line = 2.0 * np.pi / even.duration
+    peak = int(np.argmax(spectrum[1:])) + 1
+    if peak < 2:
+        raise IdentificationError(record.source, "shorter than two periods of its oscillation", "record for longer")
+
+    def left(frequency: float) -> float:
+        angle = frequency * even.time
+        columns = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
+        answer, *_ = np.linalg.lstsq(columns, position, rcond=None)
+        return float(np.sum((position - columns @ answer) ** 2))
+
+    found = minimize_scalar(left, bounds=((peak - 1.0) * line, (peak + 1.0) * line), method="bounded", options={"xatol": 1e-9})
+    return float(found.x)
+
+
+def harmonics_of(record: Record, frequency: float | None = None) -> Harmonics:
+    """The steady periods of a forced run.
+
+    Args:
+        record: of one run; a transient at its beginning is left out.
+        frequency: of the force [rad/s]; None: the strongest line.
+
+    Raises:
+        IdentificationError: fewer than four steady periods, or the body rests in each of them.
+    """
+    even = at_stamps(record.uniform())
+    w = main_frequency(even) if frequency is None else frequency
+    step = even.sample_time
+    period = 2.0 * np.pi / w
+    n_periods = int(even.duration / period)
+    if n_periods < _FEWEST:
+        raise IdentificationError(
+            record.source, f"{n_periods} periods of the force, at least {_FEWEST} are needed", "record for longer"
+        )
+    if period / step < 20.0:
+        raise IdentificationError(
+            record.source, f"sampled too slowly: {period / step:.3g} samples in a period", f"record at {20.0 / period:.3g} Hz"
+        )
+    width = max(int(period / step / 24.0) | 1, 5)
+    velocity = np.asarray(signal.savgol_filter(even.position, width, 2, deriv=1, delta=step))
+    noise = 1.4826 * float(np.median(np.abs(np.diff(even.position, 2)))) / np.sqrt(6.0)
+    slow = max(0.01 * float(np.max(np.abs(velocity))), 4.0 * noise / (step * width))
+    smooth = np.clip(velocity / slow, -1.0, 1.0)
+    signals = np.stack([even.effort, even.position, smooth, np.abs(velocity)], axis=1)
+    # From the end backwards, so that the last periods are whole; a grid of their own makes the sums exact.
+    per = int(np.ceil(period / step))
+    end = even.time[-1]
+    angle = 2.0 * np.pi * np.arange(per) / per
+    lines, means, still = [], [], []
+    for number in range(n_periods, 0, -1):
+        at = end - number * period + angle / w
+        values = np.stack([np.interp(at, even.time, column) for column in signals.T], axis=1)
+        lines.append(2.0 * np.mean(values * np.exp(-1j * (w * at))[:, None], axis=0))
+        means.append(np.mean(values, axis=0))
+        still.append(float(np.mean(values[:, 3] < slow)))
+    found, mean = np.array(lines), np.array(means)
+    first = _first_steady(found[:, 1])
+    if n_periods - first < _FEWEST:
+        raise IdentificationError(
+            record.source,
+            f"only {n_periods - first} of {n_periods} periods are steady",
+            "wait until the oscillation is steady, and record some ten periods of it",
+        )
+    # Slower than a hundredth of the top speed for longer than a sine is, near its turns.
+    resting = float(np.mean(still[first:])) - 2.0 / np.pi * slow / float(np.max(np.abs(velocity)))
+    kept = found[first:]
+    if record.hold != "linear":
+        # A force held for a sample has sin(x)/x of its values' harmonic, and the mean of two of them cos(x), x = w h/2.
+        kept[:, 0] *= np.tan(0.5 * w * step) / (0.5 * w * step)
+    return Harmonics(
+        w, kept[:, 0], kept[:, 1], kept[:, 2], kept[:, 3], mean[first:], max(resting, 0.0), record.source,
+        first * period,
+    )  # fmt: skip
+
+
+def _first_steady(position: np.ndarray) -> int:
+    """Number of the first period from which the first harmonic stays what the second half has it."""
+    later = np.mean(position[position.shape[0] // 2 :])
+    away = np.flatnonzero(np.abs(position - later) > _STEADY * abs(later))
+    return int(away[-1]) + 1 if away.size else 0
+
+
+def forced_response(record: Record, frequency: float) -> Forced:
+    """Dynamic stiffness of a steady forced run at ``frequency`` [rad/s], from the first harmonics of force and position.
+
+    Raises:
+        IdentificationError: shorter than four periods, or not steady.
+    """
+    found = harmonics_of(record, frequency)
+    ratio, covariance = _mean_of(found.force / found.position)
+    return Forced(frequency, float(np.mean(np.abs(found.position))), float(ratio.real), float(ratio.imag), covariance)
+
+
+def _mean_of(values: np.ndarray) -> tuple[complex, Array]:
+    """Mean of complex ``values``, shape ``(n,)``, and the covariance of its parts from their scatter, shape ``(2, 2)``."""
+    n = values.shape[0]
+    mean = complex(np.mean(values))
+    parts = np.stack([values.real, values.imag])
+    floor = (1e-9 * abs(mean)) ** 2 * np.eye(2)
+    return mean, np.cov(parts) / n + floor
+
+
+def forced_mechanics(
+    runs: Sequence[Forced], gains: Sequence[tuple[float, float]] | None = None, coulomb: bool = True, source: str = "recordings"
+) -> Mechanics:
+    """Mass, viscous coefficient, stiffness and Coulomb force from dynamic stiffnesses, dry friction by its describing function.
+
+    Args:
+        runs: at different frequencies; for ``coulomb`` at different amplitudes or frequencies.
+        gains: P [F/x] and D [F s/x] of a feedback that isn't part of the force, for each run; None: there is none.
+        coulomb: whether to fit dry friction too.
+        source: for messages.
+
+    Raises:
+        IdentificationError: the runs don't differ enough.
+    """
+    known = np.zeros((len(runs), 2)) if gains is None else np.array(gains, dtype=np.float64)
+    w = np.array([run.frequency for run in runs])
+    dry = np.array([4.0 / (np.pi * run.amplitude) for run in runs])
+    zero, one = np.zeros_like(w), np.ones_like(w)
+    upper = np.stack([-(w**2), zero, one, zero], axis=1)
+    lower = np.stack([zero, w, zero, dry], axis=1)
+    columns = np.concatenate([upper, lower])[:, : 4 if coulomb else 3]
+    data = np.concatenate([[r.stiff for r in runs] - known[:, 0], [r.lossy for r in runs] - known[:, 1] * w])
+    weight = 1.0 / np.sqrt(np.concatenate([[r.covariance[0, 0] for r in runs], [r.covariance[1, 1] for r in runs]]))
+    answer, covariance, apart = _solved(columns, data, weight, source)
+    n = columns.shape[1]
+    whole = np.zeros((4, 4))
+    whole[:n, :n] = covariance
+    level = float(answer[3]) if coulomb else float("nan")
+    return Mechanics(float(answer[0]), float(answer[1]), float(answer[2]), level, whole, (apart, apart))
+
+
+def _solved(columns: Array, data: Array, weight: Array, source: str) -> tuple[Array, Array, float]:
+    """Weighted least squares: parameters, covariance widened by the misfit where above 1, and the misfit.
+
+    Raises:
+        IdentificationError: the columns don't tell the parameters apart.
+    """
+    scaled = columns * weight[:, None]
+    size = np.linalg.norm(scaled, axis=0)
+    n = columns.shape[1]
+    if data.shape[0] < n or np.any(size == 0.0) or np.linalg.matrix_rank(scaled / np.where(size, size, 1.0), tol=1e-6) < n:
+        raise IdentificationError(
+            source, "the forced runs are too much alike", "force it at different frequencies and with different amplitudes"
+        )
+    unit, *_ = np.linalg.lstsq(scaled / size, data * weight, rcond=None)
+    left = data * weight - scaled / size @ unit
+    freedom = data.shape[0] - n
+    apart = float(np.sqrt(left @ left / freedom)) if freedom else 1.0
+    inverse = np.linalg.inv((scaled / size).T @ (scaled / size)) / np.outer(size, size)
+    return unit / size, inverse * max(apart, 1.0) ** 2, apart
+
+
+def _rows(run: Harmonics, gain: tuple[float, float], relaxed: float) -> tuple[Array, Array, Array]:
+    """Columns ``(3, 6)``, data and weights ``(3,)`` of one run: both parts of its dynamic stiffness, and its means."""
+    w, q = run.frequency, np.abs(run.position)
+    ratio, covariance = _mean_of(run.force / run.position)
+    sign, speed = complex(np.mean(run.sign / run.position)), complex(np.mean(run.speed / run.position))
+    force, position, sign_mean, speed_mean = np.mean(run.means, axis=0)
+    size = float(np.mean(q))
+    harmonic = np.array([-(w**2), 1j * w, 1.0, sign, speed, 0.0])
+    constant = np.array([0.0, 0.0, position - relaxed, sign_mean, speed_mean, 1.0]) / size
+    columns = np.stack([harmonic.real, harmonic.imag, constant])
+    data = np.array([ratio.real - gain[0], ratio.imag - gain[1] * w, (force - gain[0] * position) / size])
+    n = run.means.shape[0]
+    drift = float(np.var(run.means[:, 0], ddof=1)) / n / size**2
+    variance = np.array([covariance[0, 0], covariance[1, 1], drift + float(np.trace(covariance)) * 0.25])
+    return columns, data, 1.0 / np.sqrt(variance)
+
+
+def _asked(structure: Model, options: Options, source: str) -> tuple[list[str], Mask]:
+    """Names of the structure's parameters behind the columns, and which columns are fitted, shape ``(6,)``.
+
+    Raises:
+        IdentificationError: the structure holds what a forced run can't show.
+    """
+    if structure.plant.id != "rigid":
+        raise IdentificationError(
+            source,
+            f"forced runs are fitted with the plant rigid, not {structure.plant.id}",
+            "give its spring as a term (stiffness)",
+        )
+    allowed = {"stiffness", "viscous", "coulomb", "asymmetry", "bias"}
+    strange = sorted({held.effect.id for held in structure.terms} - allowed)
+    if strange:
+        raise IdentificationError(
+            source,
+            f"a forced run can't be fitted with {', '.join(strange)}",
+            f"use the terms {', '.join(sorted(allowed))}, or the method inverse-dynamics",
+        )
+    constant = "bias.force" if "bias.force" in structure.names else "asymmetry.force"
+    names = [*_COLUMNS[:5], constant]
+    present = np.array([name in structure.names and name not in options.held for name in names])
+    # The mean position shifts with any constant force: without a term for it, it is fitted all the same and named.
+    present[5] = True
+    return names, present
+
+
+def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
+    """Fit ``structure`` to steady forced runs, one recording each; ``options.gains`` are those of a feedback not in the force.
+
+    Raises:
+        IdentificationError: a recording holds no steady run, the body rests in it, or the runs don't differ.
+    """
+    source = records[0].source
+    names, present = _asked(structure, options, source)
+    if options.gains and len(options.gains) != len(records):
+        raise IdentificationError(
+            source, f"{len(options.gains)} feedback gain(s) for {len(records)} recording(s)", "give one for each recording"
+        )
+    runs = [harmonics_of(record) for record in records]
+    w = np.array([run.frequency for run in runs])
+    if present[0] and present[2] and np.ptp(w) < _APART * float(np.max(w)):
+        raise IdentificationError(
+            source, "the forced runs are too much alike: one frequency tells no mass from a spring", "force it at several"
+        )
+    for run in runs:
+        if present[3] and run.resting > MOST_RESTING:
+            raise IdentificationError(
+                run.source,
+                f"the joint rests for {100 * run.resting:.0f} % of the time",
+                "force it harder, or at a higher frequency",
+            )
+    relaxed = structure.value("stiffness.position") if "stiffness.position" in structure.names else 0.0
+    parts = [_rows(*each, relaxed) for each in zip(runs, options.gains or [(0.0, 0.0)] * len(runs), strict=True)]
+    columns, data, weight = (np.concatenate(each) for each in zip(*parts, strict=True))
+    held = {k: structure.value(names[k]) for k in range(6) if not present[k] and names[k] in structure.names}
+    data = data - sum((columns[:, k] * value for k, value in held.items()), np.zeros(data.shape[0]))
+    answer, covariance, apart = _solved(columns[:, present], data, weight, source)
+    return _result(structure, records, options, runs, (list(np.array(names)[present]), answer, covariance, apart))
+
+
+def _result(
+    structure: Model,
+    records: Sequence[Record],
+    options: Options,
+    runs: Sequence[Harmonics],
+    found: tuple[list[str], Array, Array, float],
+) -> Identification:
+    names, answer, covariance, apart = found
+    free = FreeParameters.of(structure, Options(held=options.held))
+    free = free.without({name for name in free.names if name not in names})
+    order = [names.index(name) for name in free.names]
+    values, spread, messages = structure.values, covariance[np.ix_(order, order)].copy(), []
+    values[free.index] = np.clip(answer[order], free.lower, free.upper)
+    for k in np.flatnonzero(values[free.index] != answer[order]):
+        messages.append(f"{free.names[k]} comes out as {answer[order][k]:.3g} +- {np.sqrt(spread[k, k]):.2g}, beyond its bound")
+        spread[k, :] = spread[:, k] = np.nan
+    if apart > 3.0:
+        messages.append(
+            f"the runs differ from one mass, spring and friction by {apart:.2g} times what their periods differ by, and the"
+            " standard errors are widened by that much: friction depends on more than the direction of motion"
+        )
+    judged = [at_stamps(record) for record in records]
+    if options.gains:
+        judged = [
+            replace(each, effort=each.effort - p * each.position - d * np.gradient(each.position, each.time))
+            for each, (p, d) in zip(judged, options.gains, strict=True)
+        ]
+    rows = equations(judged, options)
+    notes = [_note(run) for run in runs]
+    result = concluded(METHOD.id, Fitted(structure.with_values(values), free, spread, rows, messages), judged, options)
+    return replace(result, notes=(*notes, *result.notes))
+
+
+def _note(run: Harmonics) -> str:
+    left_out = f", {run.left_out:.2f} s before it was steady left out" if run.left_out > 0.0 else ""
+    size = float(np.mean(np.abs(run.position)))
+    return f"{run.source}: {run.means.shape[0]} periods at {run.frequency:.6g} rad/s, amplitude {size:.4g}{left_out}"
+
+
+METHOD = Method(
+    id="forced-oscillation",
+    title="forced harmonic oscillation",
+    needs="steady runs under a sinusoidal force, one recording each, at different frequencies and amplitudes",
+    source="de Marchi 1998",
+    fit=fit,
+)

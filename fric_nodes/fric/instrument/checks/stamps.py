@@ -1,0 +1,74 @@
+"""Stamps: gaps, samples that are missing, samples that were repeated, jitter.
+
+A step of n median steps is n - 1 missing samples. A sample with the same position and the same effort as the one before,
+while both usually change, is the one before again. The value is the share of samples that are missing or repeated.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...signals.stamps import grid_of
+from ..check import Check, Evidence, Finding, Verdict, each
+from ..view import View, runs
+
+__all__ = ["CHECK", "repeated"]
+
+_FAULT = 0.04
+_JITTER_FAULT = 0.35
+_JITTER = 0.1
+_CHANGES = 0.7  # share of samples, in the quicker half of the motion, that a signal has to change at
+
+
+def repeated(view: View) -> float:
+    """Share of samples, in the quicker half of the motion, that repeat the one before; NaN where that can't be told."""
+    record = view.record
+    quick = np.abs(np.diff(record.position, prepend=record.position[0])) > 0.0
+    speed = np.abs(np.interp(record.time, np.arange(view.n) * view.h, view.velocity))
+    fast = speed > 0.5 * view.speed
+    fast[0] = False
+    still_effort = np.diff(record.effort, prepend=np.nan) == 0.0
+    if view.resolution > 0.0:
+        # Only where the position moves by several of its steps from sample to sample does standing still mean something.
+        fast &= speed * record.sample_time > 3.0 * view.resolution
+    if np.sum(fast) < 50:
+        return float("nan")
+    # An effort that is itself a staircase tells nothing; one that changes with nearly every sample does.
+    if float(np.mean(~still_effort[fast & quick])) < _CHANGES:
+        return float("nan")
+    return float(np.mean((~quick & still_effort)[fast]))
+
+
+def _judge(view: View, evidence: Evidence) -> Finding:
+    time = view.record.time
+    step = np.diff(time)
+    grid = grid_of(time)
+    usual = grid.period
+    missing = np.diff(grid.number) - 1.0
+    lost = float(np.sum(missing)) / (time.size + float(np.sum(missing)))
+    again = repeated(view) if view.moves else float("nan")
+    again = 0.0 if np.isnan(again) else again
+    jitter = 1.4826 * float(np.median(np.abs(step - usual))) / usual
+    spread = float(np.std(step[missing == 0.0] - usual)) / usual
+    gaps = tuple((float(time[a]), float(time[b])) for a, b in runs(missing > 0.0))[:20]
+    share = lost + again
+    parts = []
+    if lost > 0.0:
+        parts.append(f"{100 * lost:.2g} % of the samples are missing, the longest gap {1e3 * float(np.max(step)):.3g} ms")
+    if again > 0.002:
+        parts.append(f"{100 * again:.2g} % of the samples repeat the one before")
+    uneven = max(jitter, spread)
+    if uneven > _JITTER:
+        parts.append(f"stamps jitter by {100 * uneven:.0f} % of a step")
+    # What was made of them when the recording was made ready for use.
+    parts += [note for note in view.record.notes if note.startswith(("stamps jitter", "the stamps"))]
+    bad = share > _FAULT or uneven > _JITTER_FAULT
+    verdict: Verdict = "fault" if bad else "warning" if parts else "ok"
+    remedy = (
+        "" if verdict == "ok" else "record on the machine that reads the sensor, stamp at the source; --time log may be evener"
+    )
+    detail = "; ".join(parts) or f"even to {100 * uneven:.1g} % of a step, nothing missing"
+    return Finding("stamps", verdict, detail, share, "1", remedy=remedy, time=gaps)
+
+
+CHECK = Check("stamps", "stamps, gaps and repeated samples", "stamps", each(_judge))
