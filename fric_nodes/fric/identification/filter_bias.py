@@ -21,9 +21,10 @@ from ..model import Model
 from ..record import Array, Record
 from ..signals.resolution import noise_of, step_of
 from ..simulate import Predictor, Simulator, substeps
-from .equations import Equations, Stretch, equations
+from .equations import Equations, equations
 from .result import Options
 from .scoring import force_along, force_over_intervals
+from .stretch import Stretch
 
 __all__ = ["residual_of_filters"]
 

@@ -31,9 +31,10 @@ from ..signals.initial_state import initial_state
 from ..signals.resolution import noise_of
 from ..simulate import Predictor, Simulator, intervals, substeps
 from .bootstrap import drawn_series
-from .equations import Equations, Stretch
+from .equations import Equations
 from .free_parameters import FreeParameters
 from .innovations import SETTLING, Run, gains, innovations
+from .stretch import Stretch
 
 __all__ = ["ForceErrors", "force_errors"]
 

@@ -32,8 +32,9 @@ from .design.limits import DesignError, limits_of, rig_of
 from .design.proposal import problem_for
 from .design.search import Candidate, Problem, explored
 from .equations import Equations
+from .foreseen import Finding, Foreseen
 from .gauss_newton import minimise
-from .instrument_errors import Finding, instrument_errors
+from .instrument_errors import instrument_errors
 from .methods import inverse_dynamics
 from .result import IdentificationError, Options
 from .sensitivity import VIEWS, sensitivities
@@ -47,63 +48,6 @@ _COSTS = 0.02  # relative standard error below which a coupling does no harm
 _COARSE = 2e-3  # [s]
 _DIFFERENCE = 1e-3  # relative step of derivatives
 _NEARER = 8  # steps towards the method's own values
-
-
-@dataclass(frozen=True, eq=False)
-class Foreseen:
-    """What recordings can tell about a structure; arrays of shape ``(n_parameters,)``.
-
-    Attributes:
-        names: of the parameters.
-        values: at which the sensitivities were taken.
-        alone: standard error expected if all others were known, in SI.
-        together: standard error expected, in SI; infinite where nothing is known.
-        condition: largest condition index.
-        motion: what the recordings hold, one sentence.
-        findings: in the order of their weight.
-    """
-
-    names: tuple[str, ...]
-    values: Array
-    alone: Array
-    together: Array
-    condition: float
-    motion: str
-    findings: tuple[Finding, ...]
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should know before a fit."""
-        return tuple(finding.message for finding in self.findings if finding.serious)
-
-    def summary(self) -> dict[str, Any]:
-        """As JSON."""
-
-        def number(value: float) -> float | None:
-            return float(value) if math.isfinite(value) else None
-
-        return {
-            "condition": number(self.condition),
-            "motion": self.motion,
-            "parameters": {
-                name: {
-                    "at": float(self.values[k]),
-                    "std_alone": number(float(self.alone[k])),
-                    "std_expected": number(float(self.together[k])),
-                }
-                for k, name in enumerate(self.names)
-            },
-            "findings": [
-                {
-                    "kind": finding.kind,
-                    "parameters": list(finding.parameters),
-                    "message": finding.message,
-                    "serious": finding.serious,
-                    "experiment": finding.experiment,
-                }
-                for finding in self.findings
-            ],
-        }
 
 
 def foresee(

@@ -8,44 +8,25 @@ unnoticed into the parameters, and how far is the solution of that least-squares
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.signal import savgol_filter
 
 from ..record import Array, Mask, Record
 from .design.search import Problem
+from .foreseen import Finding
 from .result import Options
 from .sensitivity import VIEWS, View, sensitivities
 
-__all__ = ["Finding", "instrument_errors"]
+__all__ = ["instrument_errors"]
 
 _SPANNED = 0.96  # R^2 from which on an instrument's error goes unnoticed: a correlation of 0.98
 _ITSELF = 0.995  # correlation of a column with an instrument's error from which on the parameter is that error
 _SMOOTH = 0.03  # [s] over which the noise of a force is taken out before its derivative
 _DISTINCT = 3e-3  # singular values below, relative to the largest, tell nothing
 _HARMLESS = 0.002  # relative change of a parameter
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing that recordings can't tell.
-
-    Attributes:
-        kind: ``unseen``, ``coupled`` or ``instrument``.
-        parameters: whom it concerns.
-        message: what, why, and what to record instead.
-        serious: False for what every recording of this kind leaves open.
-        experiment: excitation that would help, ``kind`` and ``settings``; None where none was found.
-    """
-
-    kind: str
-    parameters: tuple[str, ...]
-    message: str
-    serious: bool = True
-    experiment: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)

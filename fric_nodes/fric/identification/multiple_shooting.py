@@ -36,8 +36,9 @@ from ..signals.initial_state import initial_state
 from ..signals.instrument_noise import level_of
 from ..signals.resolution import noise_of
 from ..simulate import Predictor, Simulator, intervals, substeps
-from .equations import Equations, Stretch
+from .equations import Equations
 from .force_errors import ForceErrors
+from .stretch import Stretch
 
 __all__ = ["Run", "Shooting", "runs_over", "shooting"]
 

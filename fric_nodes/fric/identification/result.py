@@ -14,7 +14,7 @@ from ..record import Array, Record
 
 if TYPE_CHECKING:
     from ..instrument import Finding
-    from .identifiability import Foreseen
+    from .foreseen import Foreseen
 
 __all__ = ["Identification", "IdentificationError", "Method", "Options", "Score"]
 

@@ -10,7 +10,6 @@ least error in all, of which the fit then takes off what it knows (:mod:`.noise_
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +17,7 @@ from ..record import Array, Index
 from ..signals.instrument_noise import errors_like
 from .rests import MIN_ROWS, SLOW
 from .statistics import sandwich_covariance
-
-if TYPE_CHECKING:
-    from .equations import Stretch
+from .stretch import Stretch
 
 __all__ = ["UNSURE", "decimation_of"]
 

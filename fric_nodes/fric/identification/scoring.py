@@ -10,8 +10,9 @@ from ..model import Model
 from ..record import Array, Record
 from ..signals.initial_state import initial_state
 from ..simulate import Predictor, intervals, respond, simulate
-from .equations import FINER, Equations, Motion, Stretch, equations
+from .equations import Equations, equations
 from .result import Options, Score
+from .stretch import FINER, Motion, Stretch
 
 __all__ = ["driving_force", "force_along", "force_over_intervals", "free_run", "score"]
 

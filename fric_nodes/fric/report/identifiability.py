@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..identification.identifiability import Foreseen
+from ..identification.foreseen import Foreseen
 from .numbers import significant
 from .page import Section, bullets, paragraph, table
 

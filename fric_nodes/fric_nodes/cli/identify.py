@@ -30,7 +30,7 @@ from .options import (
 
 if TYPE_CHECKING:
     from fric.identification.design import Limits, Rig
-    from fric.identification.identifiability import Foreseen
+    from fric.identification.foreseen import Foreseen
     from fric.identification.result import Identification, Method, Options
     from fric.instrument import Finding
     from fric.model import Model

@@ -19,8 +19,9 @@ from scipy import signal
 from ...friction.dnlrx import DnlrxModel, DnlrxPredictor
 from ...friction.dnlrx_regression import Sliding, sliding_start
 from ...record import Array, Record
-from ..equations import Equations, Stretch, equations
+from ..equations import Equations, equations
 from ..result import IdentificationError, Options
+from ..stretch import Stretch
 
 __all__ = ["CUTOFF", "FILTER_ORDER", "Prepared", "Samples", "fractional_noe", "prepare"]
 
