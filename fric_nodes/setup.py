@@ -42,6 +42,6 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [f"{node} = {NAME}.nodes.{node}:main" for node in NODES] + ["fric = fric_nodes.cli.main:main"],
-        "fric.plugins": ["fric_nodes = fric_nodes.bench"],
+        "fric.plugins": ["fric_nodes = fric_nodes"],
     },
 )

@@ -20,7 +20,7 @@ import numpy as np
 from .errors import InputError
 from .model import Model
 from .record import Array
-from .simulate import Simulator, substeps
+from .simulation import Simulator, substeps
 
 __all__ = ["Measurement", "SimulatedAxis"]
 

@@ -2,7 +2,7 @@
 
 A model is immutable; a fit makes a new one with :meth:`Model.with_values`. Parameters are named ``mass`` (the plant's own) and
 ``coulomb.force`` (a term's), with ``#2`` behind the effect where a model holds the same effect twice. The text form,
-``fric-model/1``, is in :mod:`fric.model_file`; what a model does is in :mod:`fric.simulate`.
+``fric-model/1``, is in :mod:`fric.model_file`; what a model does is in :mod:`fric.simulation`.
 """
 
 from __future__ import annotations

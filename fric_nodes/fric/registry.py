@@ -1,17 +1,24 @@
 """Finding the members of a catalogue: every module of a package that defines one constant, here or in a plugin.
 
 A catalogue (effects, plants, excitations, importers, checks, identification methods, ...) is a folder. A new member is one new
-file in it; the listing of the folder is the listing of the catalogue. A package of somebody else's adds members of any kind
-without a change to this one: it names itself under the entry point group ``fric.plugins``, and its modules define the same
-constants (``EFFECT``, ``PLANT``, ``METHOD``, ...)::
+file in it; the listing of the folder is the listing of the catalogue.
+
+A package of somebody else's adds members of any kind. It names itself under the entry point group ``fric.plugins``::
 
     [project.entry-points."fric.plugins"]
-    my_axis = "my_axis.friction"
+    my_axis = "my_axis"
+
+and holds its members in modules or folders with the names of the catalogues here: ``my_axis/effects.py`` or
+``my_axis/effects/my_law.py`` with a constant ``EFFECT``, likewise ``plants`` (``PLANT``), ``excitation`` (``EXCITATION``),
+``importers`` (``IMPORTER``), ``methods`` (``METHOD``), ``checks`` (``CHECK``), ``controllers`` (``CONTROLLER``), ``benchmarks``
+(``BENCHMARK``) and ``report`` (``REPORT``). Each is imported when its
+catalogue is, so that an effect must not import what is built on effects.
 """
 
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import pkgutil
 from collections.abc import Iterator
 from functools import cache
@@ -40,7 +47,7 @@ def discover(package: str, constant: str, kind: type[Member]) -> list[Member]:
         ImportError: a plugin can't be imported; its message names the plugin.
     """
     found: list[Member] = []
-    for module in (*_below(importlib.import_module(package)), *_plugin_modules()):
+    for module in (*_below(importlib.import_module(package)), *_in_plugins(package.rpartition(".")[2])):
         member = vars(module).get(constant)
         if member is None:
             continue
@@ -65,9 +72,11 @@ def _plugins() -> tuple[tuple[str, str], ...]:
     return tuple(sorted({(each.name, each.value) for each in entry_points(group=GROUP)}))
 
 
-def _plugin_modules() -> Iterator[ModuleType]:
-    for name, value in _plugins():
+def _in_plugins(catalogue: str) -> Iterator[ModuleType]:
+    """The modules of every plugin that belong to a catalogue, by its folder's name."""
+    for name, package in _plugins():
         try:
-            yield from _below(importlib.import_module(value))
+            if importlib.util.find_spec(f"{package}.{catalogue}") is not None:
+                yield from _below(importlib.import_module(f"{package}.{catalogue}"))
         except ImportError as error:
-            raise ImportError(f"plugin '{name}' ({value}) can't be imported: {error}; mend it or uninstall it") from error
+            raise ImportError(f"plugin '{name}' ({package}) can't be imported: {error}; mend it or uninstall it") from error

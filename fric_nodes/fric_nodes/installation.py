@@ -80,7 +80,7 @@ def _cache() -> Item:
 def _compiler() -> Item:
     import numpy as np
     from fric.model import build_model, term
-    from fric.simulate import simulate
+    from fric.simulation import simulate
 
     started = time.perf_counter()
     model = build_model("rigid", {"mass": 2.0}, [term("viscous", coefficient=4.0)])

@@ -7,7 +7,7 @@ import pytest
 from fric.axis import SimulatedAxis
 from fric.model import Model, build_model, term
 from fric.plants import PLANTS
-from fric.simulate import Simulator
+from fric.simulation import Simulator
 
 FREE = build_model("rigid", {"mass": 2.0}, [])
 

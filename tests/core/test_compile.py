@@ -15,7 +15,7 @@ SCRIPT = """
 import sys, time
 import numpy as np
 from fric.model import build_model, term
-from fric.simulate import predict_force, simulate
+from fric.simulation import predict_force, simulate
 model = build_model("rigid", {"mass": 1.2}, [term("coulomb", force=4.0)])
 start = time.perf_counter()
 motion = simulate(model, np.full(100, 9.0), 1e-3)

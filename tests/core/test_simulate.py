@@ -10,7 +10,7 @@ import pytest
 from fric.model import build_model, term
 from fric.parameter import Parameter
 from fric.registry import discover
-from fric.simulate import Simulator, intervals, simulate, substeps
+from fric.simulation import Simulator, intervals, simulate, substeps
 
 
 def test_a_recorded_force_acts_before_after_or_around_its_stamp() -> None:

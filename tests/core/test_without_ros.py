@@ -8,7 +8,7 @@ import sys
 SCRIPT = """
 import importlib, pkgutil, sys
 
-BLOCKED = {"rclpy", "fric_interfaces", "sensor_msgs", "std_msgs", "diagnostic_msgs", "rcl_interfaces", "fric_nodes"}
+BLOCKED = {"rclpy", "fric_interfaces", "sensor_msgs", "std_msgs", "diagnostic_msgs", "rcl_interfaces"}
 
 class NoRos:
     def find_spec(self, name, path=None, target=None):

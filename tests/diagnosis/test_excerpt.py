@@ -10,7 +10,7 @@ from fric.diagnosis.excerpt import excerpt
 from fric.diagnosis.track import Track
 from fric.model import Term, build_model, term
 from fric.record import Record
-from fric.simulate import simulate
+from fric.simulation import simulate
 
 H, N = 0.001, 60_000
 MASS, COULOMB = 2.0, 4.0

@@ -8,7 +8,7 @@ from fric.diagnosis import diagnose
 from fric.diagnosis.fine import fine_periods
 from fric.model import build_model, term
 from fric.record import Record
-from fric.simulate import simulate
+from fric.simulation import simulate
 
 PITCH = 2.5e-3
 H = 1e-3

@@ -9,7 +9,7 @@ from fric.diagnosis.grow import Growth, helped
 from fric.diagnosis.track import Track
 from fric.model import Model, build_model, term
 from fric.record import Record
-from fric.simulate import simulate
+from fric.simulation import simulate
 
 H = 1e-3
 TRUTH = build_model("rigid", {"mass": 60.0}, [term("coulomb", force=20.0), term("viscous", coefficient=120.0)])

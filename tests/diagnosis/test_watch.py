@@ -11,7 +11,7 @@ from fric.diagnosis.suspects import suspects
 from fric.diagnosis.watch import Phase, Watch, WatchSettings
 from fric.model import Model, Term, build_model, term
 from fric.record import Array
-from fric.simulate import Simulator, substeps
+from fric.simulation import Simulator, substeps
 
 H = 0.002
 

@@ -11,7 +11,7 @@ from fric.effect import Effect
 from fric.effects import EFFECTS
 from fric.model import Model, Term, build_model, term
 from fric.record import Array
-from fric.simulate import Simulator, simulate
+from fric.simulation import Simulator, simulate
 
 H = 1e-3
 ABLE = common_effects()

@@ -7,7 +7,7 @@ import pytest
 from fric.effect import Context
 from fric.effects import EFFECTS
 from fric.model import Model, build_model, term
-from fric.simulate import Simulator, predict_force
+from fric.simulation import Simulator, predict_force
 from scipy.integrate import solve_ivp
 
 # Szell, parameters of Model A and B.

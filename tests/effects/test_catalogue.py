@@ -20,7 +20,7 @@ from fric.model_file import model_from_text, model_to_text
 from fric.parameter import Parameter
 from fric.plants import PLANTS
 from fric.record import Units
-from fric.simulate import Simulator
+from fric.simulation import Simulator
 
 # Every id that an effect may have.
 VOCABULARY = {

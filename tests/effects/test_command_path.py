@@ -7,7 +7,7 @@ import pytest
 from fric.control.feedforward import Feedforward
 from fric.effects import EFFECTS
 from fric.model import build_model, term
-from fric.simulate import Simulator, predict_force, simulate
+from fric.simulation import Simulator, predict_force, simulate
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm
 

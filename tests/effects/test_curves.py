@@ -10,7 +10,7 @@ import pytest
 from fric.effect import Context
 from fric.effects import EFFECTS
 from fric.model import Term, build_model, term
-from fric.simulate import Simulator, predict_force
+from fric.simulation import Simulator, predict_force
 from scipy.integrate import quad, solve_ivp
 
 SPEEDS = [-2.0, -0.01, 1e-9, 0.003, 0.7]

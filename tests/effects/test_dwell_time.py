@@ -9,7 +9,7 @@ import pytest
 from fric.effect import Context
 from fric.effects import EFFECTS
 from fric.model import Model, build_model, term
-from fric.simulate import Predictor, Simulator
+from fric.simulation import Predictor, Simulator
 from fric.steps.ageing import grow_older
 from scipy.integrate import solve_ivp
 

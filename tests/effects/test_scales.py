@@ -7,7 +7,7 @@ import pytest
 from fric.effect import Context
 from fric.effects import EFFECTS
 from fric.model import build_model, term
-from fric.simulate import Simulator, predict_force
+from fric.simulation import Simulator, predict_force
 
 
 def scaled(key: str, *p: float, q: float = 0.0, t: float = 0.0, load: float = 1.0, temperature: float = 0.0) -> float:

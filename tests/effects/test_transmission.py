@@ -11,7 +11,7 @@ from fric.effects import EFFECTS
 from fric.effects.impact_backlash import damping_for, duration, restitution
 from fric.effects.impact_backlash_hunt_crossley import restitution as crossley_restitution
 from fric.model import Model, ModelError, Term, build_model, term
-from fric.simulate import Simulator
+from fric.simulation import Simulator
 from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp
 

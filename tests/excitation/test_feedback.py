@@ -11,7 +11,7 @@ from fric.excitation.parametric_oscillation import Oscillation
 from fric.excitation.sequence import Sequence
 from fric.excitation_kind import ExcitationError
 from fric.model import build_model, term
-from fric.simulate import Simulator
+from fric.simulation import Simulator
 
 H = 5e-4
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fric.friction.asperity import AsperityParameters, AsperityPopulation
 from fric.model import Model, build_model, term
-from fric.simulate import Predictor, Simulator
+from fric.simulation import Predictor, Simulator
 
 LEVEL, STIFFNESS, WAVE, TIME, GROWTH, N = 4.0, 2e5, 1e-3, 0.05, 3.0, 400
 GAP = 0.8

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fric.friction.lubricated_bearing import general, simple, transition_force
 from fric.model import ModelError, build_model, term
-from fric.simulate import Predictor, Simulator
+from fric.simulation import Predictor, Simulator
 from numpy.typing import NDArray
 
 MU, TRANSITION, CURVATURE, VISCOUS, NOMINAL = 0.1, 187.9, 0.02, 2500.0, 1000.0

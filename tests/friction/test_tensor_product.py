@@ -15,7 +15,7 @@ from fric.friction.tensor_product_transformation import (
     transform,
 )
 from fric.model import Model, build_model, term
-from fric.simulate import simulate
+from fric.simulation import simulate
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

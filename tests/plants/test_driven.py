@@ -7,7 +7,7 @@ import pytest
 from fric.model import Model, Term, build_model, term
 from fric.plants import PLANTS
 from fric.plants.rigid_driven import DRIVEN
-from fric.simulate import Simulator, predict_force, simulate
+from fric.simulation import Simulator, predict_force, simulate
 
 SPRING = term("compliance", stiffness=2e4, damping=5.0)
 FRICTION = (term("coulomb", force=2.0), term("stribeck", force=1.0, velocity=0.02))

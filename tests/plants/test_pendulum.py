@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from fric.model import Model, Term, build_model, term
-from fric.simulate import Predictor, Simulator
+from fric.simulation import Predictor, Simulator
 from scipy.integrate import solve_ivp
 
 

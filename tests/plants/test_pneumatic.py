@@ -11,7 +11,7 @@ from fric.model_file import read_model
 from fric.plants import PLANTS
 from fric.plants.pneumatic import flow, opening, psi
 from fric.shared_files import config_file
-from fric.simulate import Simulator
+from fric.simulation import Simulator
 from fric.verification import pneumatic_reference as reference
 from numpy.typing import NDArray
 

@@ -11,7 +11,7 @@ from fric.model import Model, build_model, term
 from fric.model_file import read_model
 from fric.plants import PLANTS
 from fric.shared_files import config_file
-from fric.simulate import Simulator
+from fric.simulation import Simulator
 from fric.verification.quarter_car_reference import integrate, normal_force
 from numpy.typing import NDArray
 

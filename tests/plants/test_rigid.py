@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fric.model import Model, build_model, term
-from fric.simulate import Predictor, Simulator, simulate
+from fric.simulation import Predictor, Simulator, simulate
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fric.model import Model, Term, build_model, term
 from fric.plants import PLANTS
-from fric.simulate import Predictor, Simulator, simulate
+from fric.simulation import Predictor, Simulator, simulate
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

@@ -23,7 +23,7 @@ from ..identification.equations import surroundings
 from ..model import Model
 from ..record import Array, Record
 from ..signals.initial_state import initial_state
-from ..simulate import Simulator
+from ..simulation import Simulator
 from .cascade import Cascade, CascadeGains
 from .controller_file import ControllerSettings
 from .feedforward import Feedforward

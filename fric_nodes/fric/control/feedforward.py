@@ -1,6 +1,6 @@
 """Feedforward of the force that a model needs along the reference, with changes that don't jump.
 
-The force is that of :class:`fric.simulate.Predictor`: inertia, velocity-dependent friction and the state of the slip
+The force is that of :class:`fric.simulation.Predictor`: inertia, velocity-dependent friction and the state of the slip
 dynamics, on the *reference* motion, so that no measurement noise and no delay enters. A command given for sample k acts over
 the interval that follows, hence the force is wanted for a moment ``preview`` later: the reference is extrapolated with its
 velocity, its acceleration, and the difference of its accelerations. Half a sample is right for a force that is held over one
@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..model import Model
-from ..simulate import Predictor
+from ..simulation import Predictor
 
 __all__ = ["Feedforward", "FeedforwardError", "prepare"]
 

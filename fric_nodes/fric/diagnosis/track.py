@@ -39,7 +39,7 @@ from ..model import Model, Term
 from ..plants import PLANTS
 from ..record import Array, Index, Record
 from ..signals.resolution import noise_of, step_of
-from ..simulate import respond, substeps
+from ..simulation import respond, substeps
 from ..threads import n_threads
 from .universe import universe_of
 

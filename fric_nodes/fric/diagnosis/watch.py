@@ -24,7 +24,7 @@ import numpy as np
 from ..model import Model
 from ..record import Array, Record
 from ..signals.resolution import noise_of, step_of
-from ..simulate import substeps
+from ..simulation import substeps
 
 __all__ = ["BANDWIDTHS", "Phase", "Watch", "WatchSettings"]
 

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 
 from ..model import Model
 from ..record import Array, Mask
-from ..simulate import Motion, predict_force
+from ..simulation import Motion, predict_force
 from .tensor_product_transformation import TensorProduct, TensorProductError, transform
 from .two_branches import Tables, simulate_mass
 
@@ -121,7 +121,7 @@ class TensorProductFriction:
     ) -> Motion:
         """Free run of the mass under the forces ``effort`` [F].
 
-        Sticking is exact; arguments as of :func:`fric.simulate.simulate`.
+        Sticking is exact; arguments as of :func:`fric.simulation.simulate`.
         """
         return simulate_mass(
             self.tables(), self.mass, effort, sample_time,

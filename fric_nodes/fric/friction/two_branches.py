@@ -15,7 +15,7 @@ import numpy as np
 
 from ..engine.kernel import kernel, loop
 from ..record import Array
-from ..simulate import Motion, intervals
+from ..simulation import Motion, intervals
 
 __all__ = ["Tables", "simulate_mass"]
 
@@ -133,7 +133,7 @@ def simulate_mass(
 ) -> Motion:
     """Free run of ``mass`` [F s^2/x] under the forces ``effort`` [F], ``(n_samples,)``.
 
-    Arguments as of :func:`fric.simulate.simulate`.
+    Arguments as of :func:`fric.simulation.simulate`.
     """
     given = np.ascontiguousarray(intervals(effort, hold))
     states = np.empty((given.shape[0], 2))

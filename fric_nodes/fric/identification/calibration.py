@@ -21,7 +21,7 @@ from scipy.special import ndtri
 
 from ..model import Model, build_model, term
 from ..record import Array, Record
-from ..simulate import Simulator, substeps
+from ..simulation import Simulator, substeps
 from ..threads import alone
 from .result import Options
 

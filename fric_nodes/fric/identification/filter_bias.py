@@ -20,7 +20,7 @@ import numpy as np
 from ..model import Model
 from ..record import Array, Record
 from ..signals.resolution import noise_of, step_of
-from ..simulate import Predictor, Simulator, substeps
+from ..simulation import Predictor, Simulator, substeps
 from .equations import Equations, equations
 from .result import Options
 from .scoring import force_along, force_over_intervals

@@ -29,7 +29,7 @@ from ..model import Model
 from ..record import Array, Index, Mask
 from ..signals.initial_state import initial_state
 from ..signals.resolution import noise_of
-from ..simulate import Predictor, Simulator, intervals, substeps
+from ..simulation import Predictor, Simulator, intervals, substeps
 from .bootstrap import drawn_series
 from .equations import Equations
 from .free_parameters import FreeParameters

@@ -22,7 +22,7 @@ from ..model import Model
 from ..record import Array, Record
 from ..signals.initial_state import initial_state
 from ..signals.resolution import noise_of
-from ..simulate import intervals
+from ..simulation import intervals
 from .equations import surroundings
 
 __all__ = ["SETTLING", "Run", "excerpt", "gains", "innovations", "runs_of"]
@@ -48,7 +48,7 @@ class Run:
         temperature: difference from reference [K], one value or ``(n,)``.
         noise: of the position signal [x].
         effort_noise: of the recorded force at each sample [F]; that of an interval between two samples is another.
-        hold: how the force over an interval comes from those at the samples, see :func:`fric.simulate.intervals`.
+        hold: how the force over an interval comes from those at the samples, see :func:`fric.simulation.intervals`.
         late: part of a sample by which a ``linear`` force acts after its stamps, on the curve through its samples; None: it is
             taken as the line through them.
         between: standard deviation of what may have acted between two samples beside what these say [F], shape ``(n,)``;

@@ -35,7 +35,7 @@ from ..record import Array, Index
 from ..signals.initial_state import initial_state
 from ..signals.instrument_noise import level_of
 from ..signals.resolution import noise_of
-from ..simulate import Predictor, Simulator, intervals, substeps
+from ..simulation import Predictor, Simulator, intervals, substeps
 from .equations import Equations
 from .force_errors import ForceErrors
 from .stretch import Stretch

@@ -9,7 +9,7 @@ import numpy as np
 from ..model import Model
 from ..record import Array, Record
 from ..signals.initial_state import initial_state
-from ..simulate import Predictor, intervals, respond, simulate
+from ..simulation import Predictor, intervals, respond, simulate
 from .equations import Equations, equations
 from .result import Options, Score
 from .stretch import FINER, Motion, Stretch

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array, Index, Mask, Record
-from ..simulate import substeps
+from ..simulation import substeps
 from .equations import equations
 from .free_parameters import FreeParameters
 from .innovations import SETTLING, innovations, runs_of

@@ -182,7 +182,7 @@ class Check:
 
 def _force(model: Model, velocity: float, acceleration: float) -> float:
     """Force that ``model`` needs at position 0 [F]."""
-    from ..simulate import predict_force
+    from ..simulation import predict_force
 
     def one(value: float) -> Array:
         return np.array([value])

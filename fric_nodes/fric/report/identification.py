@@ -12,7 +12,7 @@ from ..identification.scoring import driving_force, force_along, free_run
 from ..model import Model
 from ..model_file import model_to_text
 from ..record import Array, Record
-from ..simulate import predict_force
+from ..simulation import predict_force
 from .checks import checks_section
 from .figures import Curve, scatter_and_curves, stacked
 from .identifiability import identifiability_section

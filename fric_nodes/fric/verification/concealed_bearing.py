@@ -11,7 +11,7 @@ from ..model import build_model, term
 from ..model_file import read_model
 from ..record import Array, Record
 from ..shared_files import config_file
-from ..simulate import Simulator
+from ..simulation import Simulator
 from .concealed_reference import Case, Limits, evidence, found_in
 from .quarter_car_reference import normal_force, road
 from .verification import Evidence, Verification

@@ -15,7 +15,7 @@ from ..friction.dnlrx_regression import deformations, from_coefficients, noe, re
 from ..model import build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves, stacked
-from ..simulate import simulate
+from ..simulation import simulate
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

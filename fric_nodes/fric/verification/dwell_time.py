@@ -12,7 +12,7 @@ from ..bench.benchmark import Figure
 from ..model import Model, build_model, term
 from ..record import Array
 from ..report.figures import COLOURS, Curve, scatter_and_curves
-from ..simulate import Predictor, Simulator
+from ..simulation import Predictor, Simulator
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

@@ -14,7 +14,7 @@ from ..bench.benchmark import Figure
 from ..model import Term, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves
-from ..simulate import Simulator
+from ..simulation import Simulator
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

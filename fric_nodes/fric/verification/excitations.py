@@ -19,7 +19,7 @@ from ..excitation_kind import Excitation, Points, Trajectory
 from ..model import build_model, term
 from ..record import Array
 from ..report.figures import Curve, stacked
-from ..simulate import Simulator
+from ..simulation import Simulator
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

@@ -12,7 +12,7 @@ from ..bench.benchmark import Figure
 from ..model import Model, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves
-from ..simulate import Predictor
+from ..simulation import Predictor
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

@@ -24,7 +24,7 @@ from ..bench.benchmark import Figure
 from ..model import Model, Term, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves, stacked
-from ..simulate import Simulator, substeps
+from ..simulation import Simulator, substeps
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

@@ -29,7 +29,7 @@ from ..model import Model, Term, build_model, term
 from ..parameter import Parameter
 from ..record import Array
 from ..report.figures import COLOURS, Curve, stacked
-from ..simulate import Simulator
+from ..simulation import Simulator
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

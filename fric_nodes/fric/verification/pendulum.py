@@ -22,7 +22,7 @@ from ..bench.benchmark import Figure
 from ..model import Model, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves, stacked
-from ..simulate import Simulator
+from ..simulation import Simulator
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION", "DataSet", "turning_points"]

@@ -23,7 +23,7 @@ from ..model_file import read_model
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves, stacked
 from ..shared_files import config_file
-from ..simulate import Motion, Simulator, simulate
+from ..simulation import Motion, Simulator, simulate
 from . import pneumatic_reference as reference
 from .verification import Evidence, Verification
 

@@ -16,7 +16,7 @@ from ..bench.benchmark import Figure
 from ..model import Term, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves
-from ..simulate import Predictor
+from ..simulation import Predictor
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

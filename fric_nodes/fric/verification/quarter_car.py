@@ -15,7 +15,7 @@ from ..model_file import read_model
 from ..record import Array, Mask
 from ..report.figures import Curve, scatter_and_curves, stacked
 from ..shared_files import config_file
-from ..simulate import Simulator
+from ..simulation import Simulator
 from .quarter_car_reference import STAGES, integrate, normal_force, road
 from .verification import Evidence, Verification
 

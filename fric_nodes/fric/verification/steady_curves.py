@@ -13,7 +13,7 @@ from ..bench.benchmark import Figure
 from ..model import Model, Term, build_model, term
 from ..record import Array
 from ..report.figures import COLOURS, Curve, scatter_and_curves
-from ..simulate import Simulator, predict_force
+from ..simulation import Simulator, predict_force
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

@@ -20,7 +20,7 @@ from ..bench.benchmark import Figure
 from ..model import Model, Term, build_model, term
 from ..record import Array
 from ..report.figures import Curve, stacked
-from ..simulate import Simulator
+from ..simulation import Simulator
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

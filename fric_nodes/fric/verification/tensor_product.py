@@ -15,7 +15,7 @@ from ..friction.tensor_product_transformation import TensorProduct, deviation, s
 from ..model import Model, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves
-from ..simulate import simulate
+from ..simulation import simulate
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]

@@ -96,7 +96,7 @@ def _recorded(path: Path, options: ReadOptions, model: Model) -> Record:
 
 def _free_run(held: Model, model: Path, force: Path, record: Record, out: Path) -> _Shown:
     import numpy as np
-    from fric import simulate as simulation
+    from fric import simulation
     from fric.bagio.write import write_record
     from fric.identification.equations import surroundings
     from fric.signals.initial_state import initial_state

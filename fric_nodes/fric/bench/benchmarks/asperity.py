@@ -13,7 +13,7 @@ import numpy as np
 
 from ...friction.asperity import AsperityParameters, AsperityPopulation
 from ...model import Model, build_model, term
-from ...simulate import Simulator, substeps
+from ...simulation import Simulator, substeps
 from ..benchmark import Benchmark, Figure
 
 __all__ = ["BENCHMARK"]

@@ -20,7 +20,7 @@ from ...identification.result import Options
 from ...identification.start import start_model
 from ...model import build_model, term
 from ...record import Array, Record, Units
-from ...simulate import simulate
+from ...simulation import simulate
 from ...verification import pneumatic_reference as reference
 from ..benchmark import Benchmark, Figure
 from ..trials import SEEDS, Finding, count, figures_of, over_interval

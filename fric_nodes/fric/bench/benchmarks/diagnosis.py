@@ -18,7 +18,7 @@ import numpy as np
 from ...diagnosis import diagnose
 from ...model import Model, Term, build_model, term
 from ...record import Record
-from ...simulate import simulate
+from ...simulation import simulate
 from ...threads import end_with_parent
 from ..benchmark import Benchmark, Figure
 

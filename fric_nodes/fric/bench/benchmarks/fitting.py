@@ -19,7 +19,7 @@ from ...identification import METHODS
 from ...identification.result import Identification, Options
 from ...model import Model, build_model, term
 from ...record import Record
-from ...simulate import simulate
+from ...simulation import simulate
 from ..benchmark import Benchmark, Figure
 from ..by_scipy import fit_by_scipy
 

@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from ...model import build_model, term
-from ...simulate import simulate
+from ...simulation import simulate
 from ..benchmark import Benchmark, Figure
 
 __all__ = ["BENCHMARK"]

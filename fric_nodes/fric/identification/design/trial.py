@@ -21,7 +21,7 @@ from ...excitation.sequence import Sequence as Parts
 from ...excitation_kind import Excitation, Feedback, Trajectory
 from ...model import Model
 from ...record import Array, Record
-from ...simulate import Simulator, substeps
+from ...simulation import Simulator, substeps
 from ..free_parameters import FreeParameters
 from ..result import IdentificationError, Options
 from ..sensitivity import VIEWS, Information, information, sensitivities, settled

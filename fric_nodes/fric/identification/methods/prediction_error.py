@@ -44,7 +44,7 @@ from scipy.signal import savgol_filter
 
 from ...model import Model
 from ...record import Array, Index, Record
-from ...simulate import substeps
+from ...simulation import substeps
 from ..agreement import reconciled, unsuited
 from ..conclusion import Fitted, concluded, standard_errors
 from ..equations import Equations

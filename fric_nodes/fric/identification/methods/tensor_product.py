@@ -92,7 +92,7 @@ def _by_map(law: TensorProductFriction, samples: Samples) -> Array:
 
 def _by_model(model: Model, samples: Samples) -> Array:
     """Friction of ``model`` at the samples [F], shape ``(n,)``."""
-    from ...simulate import predict_force
+    from ...simulation import predict_force
 
     none = np.zeros_like(samples.velocity)
     bare = model.with_terms(())

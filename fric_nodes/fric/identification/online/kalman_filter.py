@@ -41,7 +41,7 @@ import numpy as np
 
 from ...model import Model
 from ...record import Array, Mask
-from ...simulate import substeps
+from ...simulation import substeps
 from ..free_parameters import FreeParameters
 from .loops import carry, collapse, correct, scatter, tell
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...model import Model
 from ...record import Array, Mask, Record
-from ...simulate import predict_force
+from ...simulation import predict_force
 from ..conclusion import standard_errors
 from ..free_parameters import FreeParameters
 from ..result import Identification, IdentificationError, Options

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...model import Model
 from ...record import Array, Record
-from ...simulate import simulate
+from ...simulation import simulate
 from ..equations import equations
 from ..result import Options, Score
 from ..scoring import force_along

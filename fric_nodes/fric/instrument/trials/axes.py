@@ -16,7 +16,7 @@ from ...excitation import EXCITATIONS
 from ...excitation_kind import Points
 from ...model import Model, Term, build_model, term
 from ...record import Array, Record, Units
-from ...simulate import Simulator, substeps
+from ...simulation import Simulator, substeps
 
 __all__ = ["AXES", "CLEAN_ONLY", "MOTIONS", "Raw", "Rig", "draw_rig", "record_of", "run_rig"]
 

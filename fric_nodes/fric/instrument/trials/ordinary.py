@@ -2,7 +2,7 @@
 
 A body with friction, stepped after Moreau: with the free velocity v* = v + h/m (u - c v - G(q)), the friction force is the
 one that brings it to rest, at most F(v) = F_C + F_S exp(-(v/v_S)^2). G is a constant (a vertical axis) or G sin q (an arm).
-It shares no code with :mod:`fric.simulate`. Each seed draws the axis, the motion, the controller (PD or PID, its own
+It shares no code with :mod:`fric.simulation`. Each seed draws the axis, the motion, the controller (PD or PID, its own
 rate, with or without the gravity's force known), the encoder, the force signal (command or measurement, noise, steps), and
 which signals are recorded. Nothing is wrong with any of these recordings: a fault that a check finds in one is a false one.
 """
