@@ -15,6 +15,7 @@ from fric.identification.start import start_model
 from fric.model import Model
 from fric.model_file import model_from_text, model_to_text
 from fric.record import Record, Units
+from fric.report.kind import page_of
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -123,7 +124,7 @@ def test_it_is_written_and_runs_as_a_model(found: TensorProductIdentification) -
     assert again.value("coulomb.force") == found.model.value("coulomb.force")
     remark = found.remarks_on([stick_slip(9)])[0]
     assert "the map 0.0" in remark
-    page = found.page([stick_slip(1)], [], Options())
+    page = page_of(found, [stick_slip(1)], [], Options())
     assert "Vertices and weights" in page
     assert "(chosen)" in page
 

@@ -118,18 +118,6 @@ class Identification:
         """What a method has found besides the model: texts of files to write beside it, by name."""
         return {}
 
-    def page(self, records: Sequence[Record], validation: Sequence[Record], options: Options) -> str:
-        """The report as a page of its own.
-
-        Args:
-            records: the recordings that were fitted.
-            validation: recordings kept apart; may be empty.
-            options: as in the fit.
-        """
-        from ..report.identification import identification_report  # a fit itself draws nothing
-
-        return identification_report(self, records, validation, options)
-
     def remarks_on(self, validation: Sequence[Record]) -> tuple[str, ...]:
         """What the method has to say about recordings that the fit has not seen, besides the model's score."""
         return ()

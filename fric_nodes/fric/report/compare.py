@@ -6,10 +6,11 @@ import numpy as np
 
 from ..diagnosis.compare import Comparison
 from .figures import Curve, shaded, stacked
+from .kind import Report
 from .numbers import significant
 from .page import Section, bullets, figure, paragraph, render, table, tiles
 
-__all__ = ["comparison_report"]
+__all__ = ["REPORT", "comparison_report"]
 
 _MOST_SPANS = 120  # drawn; a page with thousands of them is slow
 
@@ -84,3 +85,6 @@ def _alignment(found: Comparison) -> Section:
     ]
     note = "A time of the real recording is the offset plus the ratio times the simulated one's."
     return Section("Alignment in time", (table(("", "value", "95 % interval"), rows), paragraph(note, "note")))
+
+
+REPORT = Report(Comparison, lambda found, train, validation, options: comparison_report(found))

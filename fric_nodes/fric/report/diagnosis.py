@@ -13,10 +13,11 @@ from ..model_file import model_to_text
 from ..record import Array, Record
 from .checks import checks_section
 from .figures import Curve, scatter_and_curves, shaded, stacked
+from .kind import Report
 from .numbers import significant
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 
-__all__ = ["diagnosis_report"]
+__all__ = ["REPORT", "diagnosis_report"]
 
 _MOST_SPANS = 120  # drawn; a page with thousands of them is slow
 
@@ -266,3 +267,6 @@ def _rest_section(found: Diagnosis) -> Section:
     return Section(
         "What is left, and what to record next", (paragraph(text), paragraph(f"Next experiment: {found.next_experiment}."))
     )
+
+
+REPORT = Report(Diagnosis, lambda found, train, validation, options: diagnosis_report(found, train, validation))

@@ -16,10 +16,11 @@ from ..simulation import predict_force
 from .checks import checks_section
 from .figures import Curve, scatter_and_curves, stacked
 from .identifiability import identifiability_section
+from .kind import Report
 from .numbers import significant
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 
-__all__ = ["friction_curve", "identification_report", "parameter_table", "significant"]
+__all__ = ["REPORT", "friction_curve", "identification_report", "parameter_table", "significant"]
 
 
 def friction_curve(model: Model, velocity: Array) -> Array:
@@ -188,3 +189,6 @@ def identification_report(
         sections.append(Section("What to know", (bullets(remarks),)))
     sections.append(Section("Model file", (preformatted(model_to_text(result.model)),)))
     return render(f"Identification of '{result.model.joint}'", lead, sections)
+
+
+REPORT = Report(Identification, identification_report)

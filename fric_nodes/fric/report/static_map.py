@@ -16,9 +16,10 @@ from ..model_file import model_to_text
 from ..record import Array
 from .figures import COLOURS, Curve, scatter_and_curves
 from .identification import parameter_table, significant
+from .kind import Report
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 
-__all__ = ["static_map_report"]
+__all__ = ["REPORT", "static_map_report"]
 
 _QUANTILE = 1.96
 _SHOWN_REVERSALS = 12
@@ -289,3 +290,6 @@ def static_map_report(found: StaticMap) -> str:
     sections.append(Section("Model file", (preformatted(model_to_text(found.model)),)))
     lead = f"Static maps of '{found.model.joint}' from {len(found.sources)} recording(s)."
     return render(f"Static maps of '{found.model.joint}'", lead, sections)
+
+
+REPORT = Report(StaticMap, lambda found, train, validation, options: static_map_report(found))

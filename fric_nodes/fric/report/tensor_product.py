@@ -9,9 +9,10 @@ from ..identification.methods.tensor_product import TensorProductIdentification
 from ..model_file import model_to_text
 from .figures import COLOURS, Curve, scatter_and_curves
 from .identification import parameter_table, significant
+from .kind import Report
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 
-__all__ = ["tensor_product_report"]
+__all__ = ["REPORT", "tensor_product_report"]
 
 _STYLES = {True: ("after", "speeding up"), False: ("before", "slowing down"), None: ("after", "both branches")}
 _SHOWN = 10
@@ -103,3 +104,6 @@ def tensor_product_report(found: TensorProductIdentification) -> str:
     ]
     lead = f"Tensor-product friction of '{found.model.joint}', directly from measured data."
     return render(f"Tensor-product friction of '{found.model.joint}'", lead, sections)
+
+
+REPORT = Report(TensorProductIdentification, lambda found, train, validation, options: tensor_product_report(found))

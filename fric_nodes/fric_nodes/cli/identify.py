@@ -331,9 +331,10 @@ def _write(
     """Every result, or none: all are made before the first is written."""
     from fric.files import write_text
     from fric.model_file import write_model
+    from fric.report.kind import page_of
 
     attachments = result.attachments
-    page = result.page(records, validation, options)
+    page = page_of(result, records, validation, options)
     write_text(out / "identification.json", json.dumps(summary, indent=2) + "\n")
     write_model(result.model, out / "model.yaml")
     for name, text in attachments.items():

@@ -75,12 +75,6 @@ class TensorProductIdentification(Identification):
         spread = _rms(other.friction - float(np.mean(other.friction)))
         return (f"validation: friction is off by {' and '.join(rows)}, of {spread:.3g} {unit} (root mean squares)",)
 
-    def page(self, records: Sequence[Record], validation: Sequence[Record], options: Options) -> str:
-        """The map as a page; see :meth:`Identification.page`."""
-        from ...report.tensor_product import tensor_product_report  # the report imports this module
-
-        return tensor_product_report(self)
-
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))

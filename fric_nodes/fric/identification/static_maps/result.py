@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from ...record import Record
-from ..result import Identification, Options
+from ..result import Identification
 from .break_away import BreakAway
 from .curve import Choice
 from .load import LoadLaw, MeanForce
@@ -51,12 +50,6 @@ class StaticMap(Identification):
     def several_loads(self) -> bool:
         """True when the maps are of friction over load rather than over velocity."""
         return self.loads is not None and self.loads.line is not None
-
-    def page(self, records: Sequence[Record], validation: Sequence[Record], options: Options) -> str:
-        """The maps as a page; see :meth:`Identification.page`."""
-        from ...report.static_map import static_map_report  # the report imports this module
-
-        return static_map_report(self)
 
     @property
     def attachments(self) -> Mapping[str, str]:
