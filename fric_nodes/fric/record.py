@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["Array", "Index", "Mask", "Record", "RecordError", "Units"]
 
@@ -109,6 +112,61 @@ class Record:
                 f"time does not increase at sample {at} ({self.time[at - 1]:.6f} s to {self.time[at]:.6f} s)",
                 "repair the stamps (--repair) or use the time of reception (--time log)",
             )
+
+    @classmethod
+    def from_arrays(
+        cls,
+        time: ArrayLike,
+        position: ArrayLike,
+        effort: ArrayLike,
+        *,
+        units: tuple[str, str] = ("m", "N"),
+        joint: str = "axis",
+        effort_hold: str = "unknown",
+        source: str = "arrays",
+        **signals: ArrayLike,
+    ) -> Record:
+        """A record from plain arrays, each of shape ``(n_samples,)``.
+
+        Args:
+            time: [s], increasing; need not start at 0.
+            position: in the first of ``units``.
+            effort: force or torque, in the second of ``units``.
+            units: of position (``m`` or ``rad``) and force (``N``, ``N m``, or a drive's own such as ``A``).
+            joint: name of the joint.
+            effort_hold: see :attr:`effort_hold`; what nobody states is found from the motion.
+            source: name of the recording in messages.
+            signals: ``velocity``, ``reference``, ``normal_load`` [N], ``temperature`` [degC], ...
+
+        Raises:
+            RecordError: shapes that differ, values that aren't finite, or a time that doesn't increase.
+
+        Example:
+            >>> import numpy as np
+            >>> t = np.arange(0.0, 2.0, 1e-3)
+            >>> Record.from_arrays(t, np.sin(t), np.cos(t), units=("rad", "N m")).duration
+            1.999
+        """
+        stamps = np.asarray(time, dtype=np.float64)
+        held = {name: np.array(values, dtype=np.float64) for name, values in signals.items()}
+        return cls(
+            stamps - (stamps[0] if stamps.size else 0.0),
+            np.array(position, dtype=np.float64),
+            np.array(effort, dtype=np.float64),
+            velocity=held.pop("velocity", None),
+            reference=held.pop("reference", None),
+            extra=held,
+            units=Units(*units),
+            joint=joint,
+            effort_hold=effort_hold,
+            source=source,
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """The signals as a pandas table, one column each, ``time`` [s] first."""
+        import pandas as pd
+
+        return pd.DataFrame(self.signals())
 
     def signals(self) -> dict[str, Array]:
         """Every signal that is present, by name, time first."""
