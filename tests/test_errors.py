@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 
 import pytest
-from fric.control.pid import PidError
+from fric.control.feedbacks.pid import PidError
 from fric.diagnosis import DiagnosisError
 from fric.errors import InputError
 from fric.model import ModelError

@@ -20,7 +20,7 @@ from .model import Model, ModelError, Term, build_model
 from .parameter import Parameter
 from .plants import PLANTS
 from .record import Units
-from .text_form import STRICT, UnitsEntry, dumped, line_of, loaded, text_of, units_entry, validated
+from .text_form import STRICT, UnitsEntry, dumped, field_of, line_of, loaded, text_of, units_entry, validated
 
 __all__ = ["FORMAT", "json_schema", "model_from_text", "model_to_text", "read_model", "write_model"]
 
@@ -47,21 +47,6 @@ class _Header(BaseModel):
     provenance: dict[str, str] = {}
 
 
-def _field(parameter: Parameter) -> tuple[Any, Any]:
-    bounds: dict[str, Any] = {}
-    if parameter.positive:
-        bounds["gt"] = max(parameter.lower, 0.0)
-    elif parameter.lower > -float("inf"):
-        bounds["ge"] = parameter.lower
-    if parameter.upper < float("inf"):
-        bounds["le"] = parameter.upper
-    default = ... if parameter.default is None else parameter.default
-    # Strict, so that neither a truth value nor a quoted number passes for one; the schema says the same.
-    return float, Field(
-        default, strict=True, description=f"{parameter.symbol} [{parameter.dimension}]: {parameter.doc}", **bounds
-    )
-
-
 @lru_cache(maxsize=1)
 def _term_entries() -> dict[str, type[BaseModel]]:
     """A pydantic model for each effect, by its key."""
@@ -71,7 +56,7 @@ def _term_entries() -> dict[str, type[BaseModel]]:
         if effect.law:
             is_default = by_name(effect.id) is effect
             fields["law"] = (Literal[effect.law], effect.law if is_default else ...)
-        fields |= {parameter.name: _field(parameter) for parameter in effect.parameters}
+        fields |= {parameter.name: field_of(parameter) for parameter in effect.parameters}
         doc = f"{effect.title}: {effect.equation} ({effect.source})"
         entries[key] = create_model(f"term_{key.replace('/', '_')}", __config__=STRICT, __doc__=doc, **fields)
     return entries
@@ -83,7 +68,7 @@ def _plant_entries() -> dict[str, type[BaseModel]]:
     entries = {}
     for plant in PLANTS.values():
         fields: dict[str, Any] = {"type": (Literal[plant.id], ...)}
-        fields |= {parameter.name: _field(parameter) for parameter in (plant.driven or plant).parameters}
+        fields |= {parameter.name: field_of(parameter) for parameter in (plant.driven or plant).parameters}
         doc = f"{plant.title}: {plant.equation} ({plant.source})"
         entries[plant.id] = create_model(f"plant_{plant.id}", __config__=STRICT, __doc__=doc, **fields)
     return entries

@@ -17,10 +17,12 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
 
 from .errors import InputError
+from .parameter import Parameter
 from .record import Units
 
 __all__ = [
-    "STRICT", "Number", "Positive", "UnitsEntry", "dumped", "line_of", "loaded", "row", "text_of", "units_entry", "validated",
+    "STRICT", "Number", "Positive", "UnitsEntry", "dumped", "field_of", "line_of", "loaded", "row", "text_of", "units_entry",
+    "validated",
 ]  # fmt: skip
 
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -143,3 +145,19 @@ def dumped(root: CommentedMap) -> str:
     stream = StringIO()
     yaml.dump(root, stream)
     return stream.getvalue()
+
+
+def field_of(parameter: Parameter) -> tuple[Any, Any]:
+    """Type and constraints of a declared parameter, for a pydantic model of a file."""
+    bounds: dict[str, Any] = {}
+    if parameter.positive:
+        bounds["gt"] = max(parameter.lower, 0.0)
+    elif parameter.lower > -float("inf"):
+        bounds["ge"] = parameter.lower
+    if parameter.upper < float("inf"):
+        bounds["le"] = parameter.upper
+    default = ... if parameter.default is None else parameter.default
+    # Strict, so that neither a truth value nor a quoted number passes for one; the schema says the same.
+    return float, Field(
+        default, strict=True, description=f"{parameter.symbol} [{parameter.dimension}]: {parameter.doc}", **bounds
+    )

@@ -6,7 +6,7 @@ import itertools
 import math
 
 import pytest
-from fric.control.pid import Pid, PidError, PidGains
+from fric.control.feedbacks.pid import Pid, PidError, PidGains
 
 H = 0.002
 

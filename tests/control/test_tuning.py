@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from fric.control.pid import Pid, PidGains
+from fric.control.feedbacks.pid import Pid, PidGains
 from fric.control.tuning import TuningError, loop_margins, tune
 
 MASS, DAMPING, H = 2.0, 35.0, 0.002

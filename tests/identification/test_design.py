@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from fric.control.pid import Pid
+from fric.control.feedbacks.pid import Pid
 from fric.excitation import EXCITATIONS
 from fric.excitation_kind import Excitation, Points
 from fric.identification.design import DesignError, Limits, Proposal, Rig, problem_for, propose

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from fric.axis import SimulatedAxis
+from fric.control.feedbacks.pid import Pid, PidGains
 from fric.control.feedforward import Feedforward
-from fric.control.pid import Pid, PidGains
 from fric.excitation import EXCITATIONS
 from fric.excitation.sequence import Sequence
 from fric.model import build_model, term

@@ -24,10 +24,9 @@ from ..model import Model
 from ..record import Array, Record
 from ..signals.initial_state import initial_state
 from ..simulation import Simulator
-from .cascade import Cascade, CascadeGains
+from .controller import Law, Setpoint
 from .controller_file import ControllerSettings
 from .feedforward import Feedforward
-from .pid import Pid
 
 __all__ = ["ClosedLoop", "ClosedLoopError", "closed_loop"]
 
@@ -76,9 +75,9 @@ class _Reference:
 
 def _law(
     settings: ControllerSettings, first: Array, state: tuple[float, float], force: float
-) -> tuple[Callable[[float, Array, float], float], Pid | Cascade]:
+) -> tuple[Callable[[float, Array, float], float], Law]:
     """The controller in the middle of its work: its output from time, reference and reading; and what counts its limits."""
-    h, gains = settings.period, settings.gains
+    h = settings.period
     forward = None
     if settings.feedforward is not None:
         forward = Feedforward(h, preview=0.5 * h + settings.delay, transition_time=0.0)
@@ -88,14 +87,9 @@ def _law(
         return 0.0 if forward is None else forward.step(time, *wanted.tolist())
 
     rest = force - ahead(-h, first - h * np.array([first[1], first[2], 0.0]))
-    wanted_state = float(first[0]), float(first[1])
-    if isinstance(gains, CascadeGains):
-        cascade = Cascade(gains, settings.force_limit)
-        cascade.begin(wanted_state, state, rest, h)
-        return lambda t, r, y: cascade.step(float(r[0]), float(r[1]), y, h, ahead(t, r)), cascade
-    pid = Pid(gains, settings.force_limit)
-    pid.begin(wanted_state, state, rest, h)
-    return lambda t, r, y: pid.step(float(r[0]), y, h, ahead(t, r)), pid
+    law = settings.kind.build(settings.gains, settings.force_limit)
+    law.begin(Setpoint(*first.tolist()), state, rest, h)
+    return lambda t, r, y: law.answer(Setpoint(*r.tolist()), y, h, ahead(t, r)), law
 
 
 def closed_loop(model: Model, settings: ControllerSettings, record: Record) -> ClosedLoop:

@@ -9,28 +9,29 @@
     controller: {type: pid, proportional: 1.0e+5, integral: 1.0e+6, derivative: 400.0, filter_time: 5.0e-4}
     feedforward: {model: model.yaml}    # relative to this file; terms: [coulomb, viscous] takes these only
 
-``controller: {type: cascade, position_gain: ..., velocity_gain: ...}`` is the other kind. The parameters are those of
-:class:`fric.control.pid.PidGains` and :class:`fric.control.cascade.CascadeGains`.
+The types are those of :data:`fric.control.feedbacks.CONTROLLERS`, each with the parameters that it declares.
 """
 
 from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, create_model
 
 from ..errors import InputError
 from ..model import Model
 from ..model_file import read_model
 from ..record import Units
-from ..text_form import STRICT, Positive, UnitsEntry, line_of, loaded, text_of, validated
-from .cascade import CascadeGains
+from ..text_form import STRICT, Positive, UnitsEntry, field_of, line_of, loaded, text_of, validated
+from .controller import Controller
+from .feedbacks import CONTROLLERS
 from .feedforward import Feedforward
-from .pid import PidGains
 
 __all__ = ["FORMAT", "ControllerError", "ControllerSettings", "read_controller"]
 
@@ -40,28 +41,6 @@ NotNegative = Annotated[float, Field(strict=True, ge=0.0)]
 
 class ControllerError(InputError):
     """A controller file that cannot be used."""
-
-
-class _PidEntry(BaseModel):
-    model_config = STRICT
-    type: Literal["pid"]
-    proportional: NotNegative
-    integral: NotNegative = 0.0
-    derivative: NotNegative = 0.0
-    filter_time: NotNegative = 0.0
-    position_weight: NotNegative = 1.0
-    velocity_weight: NotNegative = 1.0
-    tracking_time: NotNegative = 0.0
-
-
-class _CascadeEntry(BaseModel):
-    model_config = STRICT
-    type: Literal["cascade"]
-    position_gain: NotNegative
-    velocity_gain: Positive
-    velocity_integral: NotNegative = 0.0
-    velocity_weight: NotNegative = 0.0
-    filter_time: NotNegative = 0.0
 
 
 class _FeedforwardEntry(BaseModel):
@@ -82,7 +61,15 @@ class _File(BaseModel):
     feedforward: _FeedforwardEntry | None = None
 
 
-_KINDS: dict[str, type[_PidEntry] | type[_CascadeEntry]] = {"pid": _PidEntry, "cascade": _CascadeEntry}
+@cache
+def _entries() -> dict[str, type[BaseModel]]:
+    """A pydantic model for each kind of controller, by its id."""
+    entries = {}
+    for kind in CONTROLLERS.values():
+        fields: dict[str, Any] = {"type": (Literal[kind.id], ...)}
+        fields |= {parameter.name: field_of(parameter) for parameter in kind.parameters}
+        entries[kind.id] = create_model(f"controller_{kind.id}", __config__=STRICT, __doc__=kind.title, **fields)
+    return entries
 
 
 @dataclass(frozen=True)
@@ -92,7 +79,8 @@ class ControllerSettings:
     Attributes:
         units: of position and force.
         period: between two readings [s].
-        gains: of the control law.
+        kind: of the control law.
+        gains: of the control law, by name.
         delay: from a reading until the force that answers it acts [s].
         force_limit: largest output [F].
         resolution: step of the encoder that is read [x]; 0: ideal.
@@ -101,7 +89,8 @@ class ControllerSettings:
 
     units: Units
     period: float
-    gains: PidGains | CascadeGains
+    kind: Controller
+    gains: Mapping[str, float]
     delay: float = 0.0
     force_limit: float = math.inf
     resolution: float = 0.0
@@ -117,15 +106,15 @@ def read_controller(path: str | os.PathLike[str]) -> ControllerSettings:
     source = str(path)
     tree = loaded(text_of(path, FORMAT, ControllerError), source, "a controller file", FORMAT, ControllerError)
     entry = validated(_File, tree, tree, source, ControllerError)
-    kind = _KINDS.get(str(entry.controller.get("type")))
+    kind = CONTROLLERS.get(str(entry.controller.get("type")))
     if kind is None:
         given = entry.controller.get("type")
         problem = "type is missing" if given is None else f"type '{given}' is not known"
         raise ControllerError(
-            f"{source}, line {line_of(tree, ('controller', 'type'))}", problem, f"use one of {', '.join(_KINDS)}"
+            f"{source}, line {line_of(tree, ('controller', 'type'))}", problem, f"use one of {', '.join(CONTROLLERS)}"
         )
-    values = validated(kind, entry.controller, tree, source, ControllerError, ("controller",)).model_dump(exclude={"type"})
-    gains = PidGains(**values) if kind is _PidEntry else CascadeGains(**values)
+    given = validated(_entries()[kind.id], entry.controller, tree, source, ControllerError, ("controller",))
+    gains: dict[str, float] = given.model_dump(exclude={"type"})
     units = Units(entry.units.position, entry.units.force)
     limit = math.inf if entry.force_limit is None else entry.force_limit
     model = None
@@ -133,7 +122,7 @@ def read_controller(path: str | os.PathLike[str]) -> ControllerSettings:
         at = Path(source).parent / entry.feedforward.model
         model = Feedforward(entry.period, terms=entry.feedforward.terms).selected(read_model(at))
         _same_units(model.units, units, str(at), source)
-    return ControllerSettings(units, entry.period, gains, entry.delay, limit, entry.resolution, model)
+    return ControllerSettings(units, entry.period, kind, gains, entry.delay, limit, entry.resolution, model)
 
 
 def _same_units(one: Units, other: Units, source: str, file: str) -> None:

@@ -1,7 +1,7 @@
 """Gains of a PID position controller for a mass with viscous damping: the most integral action at a given sensitivity.
 
 Loop: m dv/dt = u - d v with the force held between samples, at a period h, the command arriving a time tau late (a fraction
-of a sample or several), and the controller of :mod:`fric.control.pid` as it computes. The plant is discretised exactly,
+of a sample or several), and the controller of :mod:`fric.control.feedbacks.pid` as it computes. The exact discrete plant,
 
     x_(k+1) = Phi(h) x_k + Phi(h - f) Gamma(f) u_(k-n-1) + Gamma(h - f) u_(k-n),     tau = n h + f,  0 <= f < h,
 
@@ -26,7 +26,7 @@ from scipy.optimize import minimize
 
 from ..errors import InputError
 from ..record import Array
-from .pid import PidGains
+from .feedbacks.pid import PidGains
 
 __all__ = ["LoopMargins", "TuningError", "loop_margins", "tune"]
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fric.control.pid import PidGains
+from fric.control.feedbacks.pid import PidGains
 from fric.control.tuning import LoopMargins, tune
 from fric.errors import InputError
 from fric.files import write_text

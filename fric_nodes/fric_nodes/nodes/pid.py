@@ -11,7 +11,7 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from fric.control.pid import Pid, PidGains
+from fric.control.feedbacks.pid import Pid, PidGains
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 

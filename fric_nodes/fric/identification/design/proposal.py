@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
-from ...control.pid import PidGains
+from ...control.feedbacks.pid import PidGains
 from ...excitation import EXCITATIONS
 from ...excitation_kind import Excitation
 from ...model import Model

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from ...control.pid import PidGains
+from ...control.feedbacks.pid import PidGains
 from ...excitation_kind import Excitation
 from ...model import Model
 from ...record import Array, Mask

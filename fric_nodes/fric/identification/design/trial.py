@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...control.pid import Pid, PidGains
+from ...control.feedbacks.pid import Pid, PidGains
 from ...control.tuning import TuningError, tune
 from ...excitation.sequence import Sequence as Parts
 from ...excitation_kind import Excitation, Feedback, Trajectory

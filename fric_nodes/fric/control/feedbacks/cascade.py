@@ -17,7 +17,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-__all__ = ["Cascade", "CascadeGains"]
+from ...parameter import Parameter
+from ..controller import Controller, Setpoint
+
+__all__ = ["CONTROLLER", "Cascade", "CascadeGains"]
 
 
 @dataclass(frozen=True)
@@ -54,19 +57,17 @@ class Cascade:
         self.gains = gains
         self.limit = limit
         self.saturated = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Start anew, at rest."""
         self._integral = 0.0
         self._velocity = 0.0
         self._before: float | None = None
 
-    def begin(self, reference: tuple[float, float], state: tuple[float, float], force: float, duration: float) -> None:
-        """Start in motion, as if it had been controlling before.
-
-        Args:
-            reference: position [x] and velocity [x/s] wanted at the first sample.
-            state: position [x] and velocity [x/s] then.
-            force: output at the first sample [F]; what the gains don't give stands in the integral, where there is one.
-            duration: time between samples [s].
-        """
+    def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
+        """Start in motion, see :meth:`fric.control.controller.Law.begin`."""
+        reference = wanted.position, wanted.velocity
         self._velocity = state[1]
         self._before = state[0] - duration * state[1]
         gains = self.gains
@@ -96,3 +97,22 @@ class Cascade:
         if (wanted - output) * error <= 0.0:
             self._integral = integral
         return output
+
+    def answer(self, wanted: Setpoint, measured: float, duration: float, feedforward: float = 0.0) -> float:
+        """:meth:`step` towards a setpoint, of which this law takes position and velocity."""
+        return self.step(wanted.position, wanted.velocity, measured, duration, feedforward)
+
+
+CONTROLLER = Controller(
+    id="cascade",
+    title="cascade of position and velocity control (P-PI)",
+    parameters=(
+        Parameter("position_gain", "k_p", "1/s", "gain of the position loop", lower=0.0),
+        Parameter("velocity_gain", "k_v", "F s/x", "gain of the velocity loop", positive=True),
+        Parameter("velocity_integral", "k_i", "F/x", "integral gain of the velocity loop", lower=0.0, default=0.0),
+        Parameter("velocity_weight", "c", "1", "weight of the reference's velocity", lower=0.0, default=0.0),
+        Parameter("filter_time", "T_f", "s", "time constant of the measured velocity's filter", lower=0.0, default=0.0),
+    ),
+    build=lambda values, limit: Cascade(CascadeGains(**values), limit),
+    source="Leonhard 2001, Control of Electrical Drives, chapter 15",
+)

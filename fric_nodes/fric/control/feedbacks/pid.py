@@ -18,9 +18,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..errors import InputError
+from ...errors import InputError
+from ...parameter import Parameter
+from ..controller import Controller, Setpoint
 
-__all__ = ["Pid", "PidError", "PidGains"]
+__all__ = ["CONTROLLER", "Pid", "PidError", "PidGains"]
 
 
 class PidError(InputError):
@@ -88,15 +90,9 @@ class Pid:
         self._derivative = 0.0
         self._before: tuple[float, float] | None = None
 
-    def begin(self, reference: tuple[float, float], state: tuple[float, float], force: float, duration: float) -> None:
-        """Start in motion, as if it had been controlling before.
-
-        Args:
-            reference: position [x] and velocity [x/s] wanted at the first sample.
-            state: position [x] and velocity [x/s] then.
-            force: output at the first sample [F]; what the gains don't give stands in the integral, where there is one.
-            duration: time between samples [s].
-        """
+    def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
+        """Start in motion, see :meth:`fric.control.controller.Law.begin`."""
+        reference = wanted.position, wanted.velocity
         gains = self.gains
         self._derivative = gains.derivative * (gains.velocity_weight * reference[1] - state[1])
         self._before = reference[0] - duration * reference[1], state[0] - duration * state[1]
@@ -152,3 +148,24 @@ class Pid:
                 self._integral += (output - wanted) * duration / max(time, duration)
         self._before = (reference, measured)
         return output
+
+    def answer(self, wanted: Setpoint, measured: float, duration: float, feedforward: float = 0.0) -> float:
+        """:meth:`step` towards a setpoint, of which this law takes the position."""
+        return self.step(wanted.position, measured, duration, feedforward)
+
+
+CONTROLLER = Controller(
+    id="pid",
+    title="PID controller of the position",
+    parameters=(
+        Parameter("proportional", "k_p", "F/x", "proportional gain", lower=0.0),
+        Parameter("integral", "k_i", "F/(x s)", "integral gain", lower=0.0, default=0.0),
+        Parameter("derivative", "k_d", "F s/x", "derivative gain", lower=0.0, default=0.0),
+        Parameter("filter_time", "T_f", "s", "time constant of the derivative's filter", lower=0.0, default=0.0),
+        Parameter("position_weight", "b", "1", "weight of the reference in the proportional part", lower=0.0, default=1.0),
+        Parameter("velocity_weight", "c", "1", "weight of the reference in the derivative part", lower=0.0, default=1.0),
+        Parameter("tracking_time", "T_t", "s", "time constant of the anti-windup; 0 takes k_p/k_i", lower=0.0, default=0.0),
+    ),
+    build=lambda values, limit: Pid(PidGains(**values), limit),
+    source="Astrom and Hagglund 2006, Advanced PID Control",
+)

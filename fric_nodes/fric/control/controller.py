@@ -1,0 +1,82 @@
+"""What a feedback controller is: its parameters, and a law that answers one reading of the position after the other.
+
+A controller is one file in ``control/feedbacks/`` with a constant ``CONTROLLER``, found by being there. Controller files
+(``fric-controller/1``), closed-loop simulations and the node ``pid`` take its parameters from the declaration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+from ..parameter import Parameter
+
+__all__ = ["Controller", "Law", "Setpoint"]
+
+
+class Setpoint(NamedTuple):
+    """The motion wanted at one instant: position [x], velocity [x/s], acceleration [x/s^2]."""
+
+    position: float
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+class Law(Protocol):
+    """A controller at work, with its state."""
+
+    limit: float
+    """Largest output [F]."""
+    saturated: int
+    """Number of samples at which the limit took something away."""
+
+    def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
+        """Start in motion, as if it had been controlling before.
+
+        Args:
+            wanted: at the first sample.
+            state: position [x] and velocity [x/s] then.
+            force: output at the first sample [F]; what the gains don't give stands in an integral, where there is one.
+            duration: time between samples [s].
+        """
+
+    def reset(self) -> None:
+        """Start anew, at rest."""
+
+    def answer(self, wanted: Setpoint, measured: float, duration: float, feedforward: float = 0.0) -> float:
+        """Output [F] for one sample that comes ``duration`` [s] after the last.
+
+        Args:
+            wanted: motion wanted.
+            measured: position [x].
+            duration: time since the last sample [s].
+            feedforward: force added inside the limit [F].
+        """
+
+
+@dataclass(frozen=True)
+class Controller:
+    """One kind of controller.
+
+    Attributes:
+        id: its name in files and parameters.
+        title: its name in a sentence.
+        parameters: its gains.
+        build: the law with values of all parameters by name, and the largest output [F].
+        source: where it comes from.
+    """
+
+    id: str
+    title: str
+    parameters: tuple[Parameter, ...]
+    build: Callable[[Mapping[str, float], float], Law] = field(repr=False)
+    source: str = ""
+
+    def refusal(self, values: Mapping[str, float]) -> str | None:
+        """What is wrong with ``values``, or None when they can be used."""
+        for parameter in self.parameters:
+            said = parameter.refusal(values[parameter.name])
+            if said is not None:
+                return f"{parameter.name} {said}"
+        return None

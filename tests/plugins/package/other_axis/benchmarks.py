@@ -1,0 +1,7 @@
+"""A benchmark of nothing."""
+
+from __future__ import annotations
+
+from fric.bench.benchmark import Benchmark, Figure
+
+BENCHMARK = Benchmark("nothing", "how long nothing takes", lambda: [Figure("nothing", 0.0, "s", "<= 0")])
