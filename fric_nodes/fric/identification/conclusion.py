@@ -12,7 +12,7 @@ from ..record import Array, Record
 from .equations import Equations
 from .free_parameters import FreeParameters
 from .misfit import misfit, refuse_undetermined
-from .result import Identification, Options
+from .result import Identification, Method, Options
 from .scoring import score
 from .verdict import warnings_of
 
@@ -46,7 +46,7 @@ def standard_errors(free: FreeParameters, covariance: Array) -> dict[str, float]
     return {name: float(np.sqrt(value)) for name, value in zip(free.names, variance, strict=True) if value >= 0}
 
 
-def concluded(method: str, fitted: Fitted, records: Sequence[Record], options: Options, trouble: str = "") -> Identification:
+def concluded(method: Method, fitted: Fitted, records: Sequence[Record], options: Options, trouble: str = "") -> Identification:
     """The result of ``method``; ``trouble`` replaces the status when the fit didn't end well.
 
     Raises:
@@ -58,14 +58,13 @@ def concluded(method: str, fitted: Fitted, records: Sequence[Record], options: O
     train = score(model, records, options, None if model.has_slip_dynamics else fitted.found)
     source = ", ".join(record.source for record in records)
     if not trouble:
-        by_force = method == "inverse-dynamics"
-        refuse_undetermined(model, fitted.free, fitted.covariance, fitted.found, train, source, by_force)
+        refuse_undetermined(model, fitted.free, fitted.covariance, fitted.found, train, source, method.predicts == "force")
     wrong = misfit(model, fitted.found, train)
     return Identification(
         model=model,
         fitted=fitted.free.names,
         covariance=fitted.covariance,
-        method=method,
+        method=method.id,
         status=trouble or wrong or status,
         warnings=(*fitted.messages, *warnings, *([wrong] if wrong and trouble else [])),
         notes=fitted.found.notes,

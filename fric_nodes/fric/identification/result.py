@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
+from ..method_settings import Options, declarations, own_settings, parsed
 from ..model import Model
 from ..record import Array, Record
 
@@ -21,40 +22,6 @@ __all__ = ["Identification", "IdentificationError", "Method", "Options", "Score"
 
 class IdentificationError(InputError):
     """Recordings from which the model's parameters can't be determined."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """Settings of a fit; None lets the method choose from the data.
-
-    Attributes:
-        cutoff: of the zero-phase low-pass filter on the position [Hz].
-        decimation: keep every n-th sample of the filtered equations.
-        rest_velocity: a joint that stays slower than this rests, and tells nothing about sliding friction meanwhile [x/s].
-        held: names of parameters to hold at their value.
-        freed: names of shape parameters to fit as well.
-        robust: weigh down outliers (Huber) instead of plain least squares.
-        horizon: length of the free runs of an output-error fit [s]; None: the whole recording in one run.
-        gains: P [F/x] and D [F s/x] of the feedback under which each recording was made, for oscillations; empty: not given.
-        bounds: limits of parameters, ``(name, lower, upper)``, inside those that they are declared with.
-        starts: number of starts of a search; the best end of all is taken.
-        start_states: where the runs of an output-error fit start: as ``measured``; ``tied`` to that by its standard error;
-            ``free``. Empty: for a whole recording tied where that error matters, else as measured; free for shorter runs.
-        continuity: weight of the jumps from the end of one of these runs to the start of the next; 0: they may jump.
-    """
-
-    cutoff: float | None = None
-    decimation: int | None = None
-    rest_velocity: float | None = None
-    held: tuple[str, ...] = ()
-    freed: tuple[str, ...] = ()
-    robust: bool = False
-    horizon: float | None = None
-    gains: tuple[tuple[float, float], ...] = ()
-    bounds: tuple[tuple[str, float, float], ...] = ()
-    starts: int = 1
-    start_states: str = ""
-    continuity: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -136,6 +103,8 @@ class Method:
         predicts: what it compares with the recording sample by sample, for statements before a fit: ``force`` along the motion,
             ``position`` from one sample to the next; empty where a fit sees something else.
         needs_force: False where no force need act, as in a free oscillation; otherwise one that never changes is refused.
+        uses: names of the common settings that it honours; another one that is given is refused.
+        settings: type of its options: the common ones, or a dataclass derived from them with settings of its own.
     """
 
     id: str
@@ -145,3 +114,28 @@ class Method:
     fit: Callable[[Model, Sequence[Record], Options], Identification] = field(repr=False)
     predicts: str = ""
     needs_force: bool = True
+    uses: tuple[str, ...] = ()
+    settings: type[Options] = Options
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.uses if name not in declarations(self.settings)]
+        if unknown:
+            raise TypeError(f"method '{self.id}' uses settings that are not declared: {', '.join(unknown)}")
+
+    @property
+    def honoured(self) -> tuple[str, ...]:
+        """Names of all settings that it honours, its own ones too."""
+        return (*self.uses, *own_settings(self.settings))
+
+    def options(self, common: Options, own: Mapping[str, str]) -> Options:
+        """The options with the method's own settings, from their texts by name.
+
+        Raises:
+            InputError: the method has no such setting, or the text can't be used.
+        """
+        known = own_settings(self.settings)
+        for name in own:
+            if name not in known:
+                remedy = f"choose from {', '.join(known)}" if known else "leave it out"
+                raise InputError(f"setting '{name}'", f"is not one of the method {self.id}", remedy)
+        return self.settings(**vars(common), **{name: parsed(name, text, self.settings) for name, text in own.items()})

@@ -1,4 +1,4 @@
-"""``fric bench``: measure, on this machine, the figures that the README states."""
+"""``fric bench``: measure the speed and the accuracy of fric on this machine, against the figures in the README."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 from fric.errors import InputError
 
 from .options import JsonOption, progress
+from .printed import console, plain_table
 
 if TYPE_CHECKING:
     from fric.bench import Benchmark
@@ -24,16 +25,14 @@ def register(app: typer.Typer) -> None:
 
 def bench(
     names: Annotated[
-        list[str] | None, typer.Argument(help="Which benchmarks; all but the long ones when none is named.")
+        list[str] | None, typer.Argument(help="Names of benchmarks. If none is given: all but the long ones.")
     ] = None,
-    everything: Annotated[bool, typer.Option("--all", help="All, the long ones too.")] = False,
-    listed: Annotated[bool, typer.Option("--list", help="Say what can be measured, and measure nothing.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="All benchmarks, the long ones too.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List the benchmarks, and measure nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure speed on this machine; exit status 1 when a goal is missed."""
+    """Measure speed and accuracy on this machine; exit status 1 when a goal is missed."""
     from fric.bench import BENCHMARKS
-    from rich.console import Console
-    from rich.table import Table
 
     if listed:
         _list(list(BENCHMARKS.values()), as_json)
@@ -53,15 +52,12 @@ def bench(
             )
         )
     else:
-        table = Table(box=None, pad_edge=False)
-        table.add_column("figure")
-        table.add_column("measured", justify="right")
-        table.add_column("goal")
+        table = plain_table(("figure", "measured", "goal"), numbers=("measured",))
         for figure in figures:
             mark = "" if figure.reached is None else " reached" if figure.reached else " missed"
             unit = "" if figure.unit == "1" else f" {figure.unit}"
             table.add_row(figure.name, f"{figure.value:.4g}{unit}", f"{figure.goal}{unit}{mark}" if figure.goal else "")
-        Console(highlight=False).print(table)
+        console().print(table)
     left_out = [name for name in BENCHMARKS if name not in chosen] if not names else []
     if left_out:
         progress(f"left out, since they take long: {', '.join(left_out)} (name them, or --all)")

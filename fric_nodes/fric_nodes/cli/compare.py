@@ -1,4 +1,4 @@
-"""``fric compare``: a simulated recording against the real one."""
+"""``fric compare``: align a simulated recording with a real one in time, and report by how much and where they differ."""
 
 from __future__ import annotations
 
@@ -8,21 +8,13 @@ from typing import Annotated
 
 import typer
 
-from .options import (
-    EndOption,
-    JointOption,
-    JsonOption,
-    OutOption,
-    ReadOptions,
-    RepairOption,
-    StartOption,
-    TimeOption,
-    TopicOption,
-    progress,
-    read_all,
-)
+from .groups import grouped
+from .options import Reading, ReadingGroup, progress, read_all
+from .results import Record, Results, ResultsGroup
 
 __all__ = ["register"]
+
+_RECORD = Record("report.json", form="fric-comparison/1")
 
 
 def register(app: typer.Typer) -> None:
@@ -34,31 +26,24 @@ def register(app: typer.Typer) -> None:
     )(compare)
 
 
+@grouped
 def compare(
     simulated: Annotated[Path, typer.Argument(help="Recording of the simulation: a rosbag2 folder or file.")],
     real: Annotated[Path, typer.Argument(help="Recording of the machine.")],
-    out: OutOption = Path("comparison"),
-    joint: JointOption = None,
-    repair: RepairOption = False,
-    time: TimeOption = "stamp",
-    start: StartOption = None,
-    end: EndOption = None,
-    topic: TopicOption = None,
-    as_json: JsonOption = False,
+    reading: ReadingGroup = Reading(),
+    results: ResultsGroup = Results(Path("comparison")),
 ) -> None:
     """Align two recordings in time and say by how much and where they differ; writes report.html and report.json."""
     from fric.diagnosis.compare import compare as align
-    from fric.files import write_text
     from fric.report.compare import comparison_report
 
-    reading = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
+    results = results.claimed(_RECORD, ("report.html",))
     progress("reading 2 recordings")
     first, second = read_all([simulated, real], reading)
     found = align(first, second)
-    page = comparison_report(found)
-    write_text(out / "report.json", json.dumps(found.report(), indent=2) + "\n")
-    write_text(out / "report.html", page)
-    if as_json:
+    report = json.dumps(found.report(), indent=2) + "\n"
+    results.write(_RECORD, {"report.html": comparison_report(found), _RECORD.name: report})
+    if results.as_json:
         typer.echo(json.dumps(found.report()))
         return
     typer.echo(found.sentence)
@@ -68,4 +53,4 @@ def compare(
     )
     for note in found.notes:
         typer.echo(f"- {note}")
-    typer.echo(f"written: {out}/{{report.html, report.json}}")
+    typer.echo(f"written: {results.out}/{{report.html, report.json}}")

@@ -1,4 +1,4 @@
-"""``fric demo``: the whole loop on a simulated axis, with a page of what came of it."""
+"""``fric demo``: excite, identify and compensate a simulated axis over ROS 2, and write a report page."""
 
 from __future__ import annotations
 
@@ -21,12 +21,14 @@ def register(app: typer.Typer) -> None:
 
 def demo(
     out: OutOption = Path("fric_demo"),
-    clock: Annotated[str, typer.Option("--clock", help="lock-step, or wall for real time.")] = "lock-step",
+    clock: Annotated[
+        str, typer.Option("--clock", help="lock-step (as fast as the machine computes, repeatable) or wall (real time).")
+    ] = "lock-step",
     rate: Annotated[float, typer.Option("--rate", help="Samples per second.", min=10.0, max=5000.0)] = 500.0,
-    seed: Annotated[int, typer.Option("--seed", help="Of motion and noise.", min=0)] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the random motion and noise.", min=0)] = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Excite, record, identify and compensate an axis whose friction the identifier doesn't know, over real ROS 2 topics."""
+    """Excite, record, identify and compensate an axis whose friction is unknown to the identification, over ROS 2."""
     from fric_nodes.demo.run import DemoSettings, run_demo
 
     start = clock_of_wall.monotonic()

@@ -1,4 +1,4 @@
-"""``fric diagnose``: what physics a nominal model leaves out of what recordings show."""
+"""``fric diagnose``: find which physical effects a model leaves out of what recordings show."""
 
 from __future__ import annotations
 
@@ -9,25 +9,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from fric.errors import InputError
 
-from .options import (
-    EndOption,
-    JointOption,
-    JsonOption,
-    OutOption,
-    ReadOptions,
-    RepairOption,
-    StartOption,
-    TimeOption,
-    TopicOption,
-    progress,
-    read_all,
-)
+from .groups import grouped
+from .options import Reading, ReadingGroup, progress, read_all
+from .printed import console
+from .results import Record as ResultRecord
+from .results import Results, ResultsGroup
 
 if TYPE_CHECKING:
     from fric.diagnosis import Diagnosis
     from fric.record import Record
 
 __all__ = ["register", "write_diagnosis"]
+
+_RECORD = ResultRecord("report.json", form="fric-report/1")
+_FILES = ("report.html", "model.yaml", "prediction.csv")
 
 
 def register(app: typer.Typer) -> None:
@@ -39,26 +34,25 @@ def register(app: typer.Typer) -> None:
     )(diagnose)
 
 
+@grouped
 def diagnose(
-    train: Annotated[list[Path], typer.Argument(help="Recordings to learn from: rosbag2 folders or files.")],
-    model: Annotated[Path, typer.Option("--model", help="Model file whose physics is in question.")],
+    train: Annotated[list[Path], typer.Argument(help="Recordings to fit models to: rosbag2 folders or files.")],
+    model: Annotated[Path, typer.Option("--model", help="Model file to test: which physical effects does it leave out?")],
     validate: Annotated[
-        list[Path] | None, typer.Option("--validate", help="Recording that nothing is learnt from; may be repeated.")
+        list[Path] | None,
+        typer.Option("--validate", help="Recording to test the result on; nothing is fitted to it. May be repeated."),
     ] = None,
     blocks: Annotated[
         int | None,
-        typer.Option("--blocks", help="In place of --validate: cut each recording into so many blocks, hold every other back."),
+        typer.Option(
+            "--blocks",
+            help="Instead of --validate: cut each recording into this many blocks and keep every other one for the test.",
+        ),
     ] = None,
-    out: OutOption = Path("diagnosis"),
-    joint: JointOption = None,
-    repair: RepairOption = False,
-    time: TimeOption = "stamp",
-    start: StartOption = None,
-    end: EndOption = None,
-    topic: TopicOption = None,
-    as_json: JsonOption = False,
+    reading: ReadingGroup = Reading(),
+    results: ResultsGroup = Results(Path("diagnosis")),
 ) -> None:
-    """Find what physics a model leaves out, and write report.html, report.json, model.yaml and prediction.csv."""
+    """Find which physical effects a model leaves out, and write report.html, report.json, model.yaml and prediction.csv."""
     from fric.diagnosis import diagnose as find
     from fric.diagnosis.blocks import in_blocks
     from fric.identification.force_needed import require_force
@@ -67,35 +61,35 @@ def diagnose(
     given = validate or []
     same = {path.resolve() for path in train} & {path.resolve() for path in given}
     if same:
-        raise InputError(same.pop(), "is both learnt from and validated on", "hold another recording back for --validate")
+        raise InputError(same.pop(), "is both fitted and validated on", "give another recording to --validate")
     if bool(given) == (blocks is not None):
-        raise InputError("--validate", "is needed, or --blocks, and not both", "hold a recording back, or blocks: --blocks 6")
+        raise InputError("--validate", "or --blocks is needed, not both", "keep a recording apart, or blocks: --blocks 6")
     nominal = read_model(model)
-    reading = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
+    results = results.claimed(_RECORD, _FILES)
     progress(f"reading {len(train) + len(given)} recording(s)")
     records = read_all(train, reading)
     require_force(records)
     records, kept_apart = (records, read_all(given, reading)) if blocks is None else in_blocks(records, blocks)
     found = find(records, kept_apart, nominal, progress)
-    write_diagnosis(out, found, records, kept_apart)
-    if as_json:
+    write_diagnosis(results, found, records, kept_apart)
+    if results.as_json:
         typer.echo(json.dumps(found.report()))
     else:
-        _print(found, out)
+        _print(found, results.out)
 
 
-def write_diagnosis(out: Path, found: Diagnosis, train: list[Record], validation: list[Record]) -> None:
+def write_diagnosis(results: Results, found: Diagnosis, train: list[Record], validation: list[Record]) -> None:
     """Every result, or none: all are made before the first is written."""
-    from fric.files import write_text
-    from fric.model_file import write_model
+    from fric.model_file import model_to_text
     from fric.report.diagnosis import diagnosis_report
 
-    page = diagnosis_report(found, train, validation)
-    table = _csv(found)
-    write_text(out / "report.json", json.dumps(found.report(), indent=2) + "\n")
-    write_text(out / "prediction.csv", table)
-    write_model(found.model, out / "model.yaml")
-    write_text(out / "report.html", page)
+    texts = {
+        "report.html": diagnosis_report(found, train, validation),
+        "model.yaml": model_to_text(found.model),
+        "prediction.csv": _csv(found),
+        _RECORD.name: json.dumps(found.report(), indent=2) + "\n",
+    }
+    results.write(_RECORD, texts)
 
 
 def _csv(found: Diagnosis) -> str:
@@ -120,19 +114,17 @@ def _csv(found: Diagnosis) -> str:
 
 
 def _print(found: Diagnosis, out: Path) -> None:
-    from rich.console import Console
-
-    console = Console()
-    console.print(found.sentence, highlight=False, markup=False)
+    shown = console()
+    shown.print(found.sentence)
     if found.force_errors_in_words:
-        console.print(found.force_errors_in_words, highlight=False, markup=False)
+        shown.print(found.force_errors_in_words)
     for each in found.findings:
-        console.print(f"- {each.evidence}; {each.component}; {each.where.regime}", highlight=False, markup=False)
+        shown.print(f"- {each.evidence}; {each.component}; {each.where.regime}")
     faults = [check for check in found.checks if check.verdict == "fault"]
     for check in faults:
-        console.print(f"- instrument: {check.detail}; {check.remedy}", highlight=False, markup=False)
+        shown.print(f"- instrument: {check.detail}; {check.remedy}")
     for note in found.notes:
-        console.print(f"- {note}", highlight=False, markup=False)
-    console.print(f"next: {found.next_experiment}", highlight=False, markup=False)
+        shown.print(f"- {note}")
+    shown.print(f"next: {found.next_experiment}")
     names = "report.html, report.json, model.yaml, prediction.csv"
-    console.print(f"written: {out}/{{{names}}}", highlight=False, markup=False)
+    shown.print(f"written: {out}/{{{names}}}")

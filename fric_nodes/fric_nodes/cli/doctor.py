@@ -1,4 +1,4 @@
-"""``fric doctor``: is the installation in order, or are these recordings."""
+"""``fric doctor``: check the installation, or recordings for faults of their instruments."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from fric.errors import InputError
 
-from .options import EndOption, JointOption, JsonOption, RepairOption, StartOption, TimeOption, TopicOption, progress
+from .groups import grouped
+from .options import JsonOption, Reading, ReadingGroup, progress, read_all
+from .printed import console, plain_table
 
 if TYPE_CHECKING:
     from fric.instrument import Finding
@@ -23,25 +25,26 @@ def register(app: typer.Typer) -> None:
     app.command("doctor", epilog="Example: fric doctor    or: fric doctor bags/slide --model axis.yaml")(doctor)
 
 
+@grouped
 def doctor(
     recordings: Annotated[
-        list[Path] | None, typer.Argument(help="Recordings to check, of one joint; the installation when none is given.")
+        list[Path] | None,
+        typer.Argument(help="Recordings of one joint to check. If none is given, the installation is checked."),
     ] = None,
     model: Annotated[
-        Path | None, typer.Option("--model", help="Model file whose mass and friction are believed: then units are judged too.")
+        Path | None,
+        typer.Option(
+            "--model", help="Model file with known mass and friction: the units of position and force are checked against it."
+        ),
     ] = None,
     gear_ratio: Annotated[
-        float | None, typer.Option("--gear-ratio", help="A gear ratio that may have been forgotten or applied twice.")
+        float | None,
+        typer.Option("--gear-ratio", help="Gear ratio of the joint, to check whether it was left out or applied twice."),
     ] = None,
-    joint: JointOption = None,
-    repair: RepairOption = False,
-    time: TimeOption = "stamp",
-    start: StartOption = None,
-    end: EndOption = None,
-    topic: TopicOption = None,
+    reading: ReadingGroup = Reading(),
     as_json: JsonOption = False,
 ) -> None:
-    """Check the installation, or what is wrong with recordings; exit status 1 when a fault is found."""
+    """Check the installation, or recordings for faults of their instruments; exit status 1 when a fault is found."""
     if not recordings:
         _installation(as_json)
         return
@@ -50,9 +53,7 @@ def doctor(
     from fric.instrument import inspect
     from fric.model_file import read_model
 
-    from .options import ReadOptions, read_all
-
-    records = read_all(recordings, ReadOptions(joint, repair, time, start, end, tuple(topic or ())))
+    records = read_all(recordings, reading)
     nominal = None if model is None else read_model(model)
     settings = {} if gear_ratio is None else {"gear_ratio": gear_ratio}
     findings = inspect(records, nominal, settings)
@@ -68,25 +69,21 @@ def doctor(
 
 def _print_findings(findings: tuple[Finding, ...], names: list[str], records: list[Record]) -> None:
     from fric.report.checks import checks_rows, checks_sentence
-    from rich.console import Console
-    from rich.table import Table
 
-    shown = Table(box=None, pad_edge=False)
-    for column in ("check", "verdict", "recording", "value", "what was found"):
-        shown.add_column(column, overflow="fold")
+    shown = plain_table(("check", "verdict", "recording", "value", "what was found"))
     rows = checks_rows(findings, names)
     several = len(names) > 1
     for check, verdict, where, value, detail, _ in rows:
         shown.add_row(check, verdict, where if several else "", value, detail)
-    console = Console(highlight=False, markup=False)
-    console.print(shown)
+    out = console()
+    out.print(shown)
     for record, name in zip(records, names, strict=True):
         for note in record.notes:
-            console.print(f"- {name}: {note}")
+            out.print(f"- {name}: {note}")
     for check, _, _, _, _, remedy in rows:
         if remedy:
-            console.print(f"- {check}: {remedy}")
-    console.print(checks_sentence(findings))
+            out.print(f"- {check}: {remedy}")
+    out.print(checks_sentence(findings))
 
 
 def _installation(as_json: bool) -> None:

@@ -6,18 +6,21 @@ import contextlib
 import json
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import typer
 from fric.errors import InputError
 
-from .options import ReadOptions, progress
+from .options import Reading, progress
+from .results import Record, Results
 
 __all__ = ["ALL", "identify_each"]
 
 ALL = "all"
+_RECORD = Record("overview.json", ("joints", "identified"))
 
 
 def _folders(joints: list[str]) -> dict[str, str]:
@@ -33,9 +36,7 @@ def _folders(joints: list[str]) -> dict[str, str]:
     return folders
 
 
-def identify_each(
-    recordings: list[Path], reading: ReadOptions, identify: Callable[..., None], asked: Mapping[str, Any]
-) -> None:
+def identify_each(recordings: list[Path], reading: Reading, results: Results, identify: Callable[[str, Results], None]) -> None:
     """Identify each joint of the recordings, and write overview.html and overview.json.
 
     A joint that can't be identified is listed with its reason and does not keep the others from it.
@@ -43,17 +44,17 @@ def identify_each(
     Args:
         recordings: all of them, those kept apart too.
         reading: how they are read.
-        identify: the command for one joint.
-        asked: its arguments; ``joint``, ``out`` and ``as_json`` are set anew for each joint.
+        results: where the overview goes; each joint gets a folder of its own below.
+        identify: identifies one joint, and writes its results.
 
     Raises:
         InputError: no joint could be identified.
     """
     from fric.bagio.read import joint_list
-    from fric.files import write_text
     from fric.report.joints import joints_overview
 
-    out, as_json = Path(asked["out"]), bool(asked["as_json"])
+    results = results.claimed(_RECORD, ("overview.html",))
+    out, as_json = results.out, results.as_json
     topics = reading.topic_names()
     joints = list(dict.fromkeys(name for path in recordings for name in joint_list(path, topics)))
     if not joints:
@@ -67,7 +68,7 @@ def identify_each(
             typer.echo(f"joint {joint}")
         try:
             with contextlib.redirect_stdout(sys.stderr) if as_json else contextlib.nullcontext():
-                identify(**{**asked, "joint": joint, "out": out / folders[joint], "as_json": False})
+                identify(joint, replace(results, out=out / folders[joint], as_json=False))
         except InputError as error:
             failed[joint] = " ".join(str(error).split())
             progress(f"joint {joint}: {failed[joint]}")
@@ -81,8 +82,7 @@ def identify_each(
     summary = {"joints": entries, "identified": len(found), "failed": len(failed)}
     links = {joint: f"{folders[joint]}/report.html" for joint in found}
     page = joints_overview(source, found, failed, links)
-    write_text(out / "overview.json", json.dumps(summary, indent=2) + "\n")
-    write_text(out / "overview.html", page)
+    results.write(_RECORD, {"overview.html": page, _RECORD.name: json.dumps(summary, indent=2) + "\n"})
     if as_json:
         typer.echo(json.dumps(summary))
         return

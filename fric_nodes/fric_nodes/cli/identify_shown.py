@@ -7,9 +7,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fric.method_settings import set_values
+
+from .printed import console, plain_table
+
 if TYPE_CHECKING:
     from fric.identification.design import Proposal
-    from fric.identification.result import Identification, Score
+    from fric.identification.result import Identification, Options, Score
     from fric.identification.uncertainty import Uncertainty
     from fric.model import Model
 
@@ -21,7 +25,7 @@ def _score_json(score: Score | None) -> dict[str, float | None] | None:
     return None if score is None else {name: value if math.isfinite(value) else None for name, value in asdict(score).items()}
 
 
-def summary_of(result: Identification) -> dict[str, Any]:
+def summary_of(result: Identification, options: Options) -> dict[str, Any]:
     """The JSON object of the contract."""
     return {
         "parameters": {
@@ -34,6 +38,7 @@ def summary_of(result: Identification) -> dict[str, Any]:
             for p in result.model.parameters()
         },
         "method": result.method,
+        "settings": set_values(options),
         "train": _score_json(result.train),
         "validation": _score_json(result.validation),
         "correlation": {
@@ -73,42 +78,28 @@ def uncertainty_json(found: Uncertainty) -> dict[str, Any]:
 
 def print_intervals(found: Uncertainty, model: Model) -> None:
     """The intervals as a table."""
-    from rich.console import Console
-    from rich.table import Table
-
-    shown = Table(
-        box=None, pad_edge=False, title=f"{found.kind}: {100 * found.probability:g} % intervals", title_justify="left"
-    )
-    shown.add_column("parameter")
-    for column in ("from", "to", "std over restarts", "over recordings"):
-        shown.add_column(column, justify="right")
-    shown.add_column("unit")
+    numeric = ("from", "to", "std over restarts", "over recordings")
+    shown = plain_table(("parameter", *numeric, "unit"), numeric)
     for k, name in enumerate(found.names):
         numbers = (found.lower[k], found.upper[k], found.restarts[k], found.recordings[k])
         texts = [f"{value:.5g}" if math.isfinite(value) else "-" for value in numbers]
         shown.add_row(name, *texts, model.unit(name))
-    console = Console()
-    console.print(shown)
+    shell = console()
+    shell.print(f"{found.kind}: {100 * found.probability:g} % intervals")
+    shell.print(shown)
     for line in found.notes:
-        console.print(f"- {line}", highlight=False, markup=False)
+        shell.print(f"- {line}")
 
 
 def print_result(result: Identification, out: Path) -> None:
     """Values, scores, remarks, and what was written."""
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console()
-    shown = Table(box=None, pad_edge=False)
-    shown.add_column("parameter")
-    for column in ("value", "standard error"):
-        shown.add_column(column, justify="right")
-    shown.add_column("unit")
+    shell = console()
+    shown = plain_table(("parameter", "value", "standard error", "unit"), ("value", "standard error"))
     for parameter in result.model.parameters():
         error = result.model.standard_errors.get(parameter.name)
         text = "held" if parameter.name not in result.fitted else "not known" if error is None else f"{error:.2g}"
         shown.add_row(parameter.name, f"{parameter.value:.6g}", text, parameter.declaration.unit(result.model.units))
-    console.print(shown)
+    shell.print(shown)
     units = result.model.units
     for name, score in (("train", result.train), ("validation", result.validation)):
         if score is not None:
@@ -118,29 +109,23 @@ def print_result(result: Identification, out: Path) -> None:
                 else ""
             )
             force = f"relative force error {score.relative_force_error_percent:.2f} %, NOE {score.noe:.4f} %"
-            console.print(f"{name}: {force}{run}", highlight=False)
+            shell.print(f"{name}: {force}{run}")
     for line in (*result.notes, *result.warnings):
-        console.print(f"- {line}", highlight=False, markup=False)
-    console.print(f"status: {result.status}", highlight=False, markup=False)
+        shell.print(f"- {line}")
+    shell.print(f"status: {result.status}")
     written = ", ".join([str(out / "model.yaml"), *result.attachments, "identification.json", "report.html"])
-    console.print(f"written: {written}", highlight=False, markup=False)
+    shell.print(f"written: {written}")
 
 
 def print_design(found: Proposal, out: Path, written: list[str]) -> None:
     """The excitations proposed, and what they are expected to bring."""
-    from rich.console import Console
-    from rich.table import Table
-
     problem = found.problem
-    console = Console()
+    shell = console()
     for part in found.parts:
         settings = ", ".join(f"{name} {value:.4g}" for name, value in part.values.items())
-        console.print(f"{part.kind.title}, {part.duration:.3g} s ({part.kind.id}: {settings})", highlight=False, markup=False)
-    shown = Table(box=None, pad_edge=False)
-    shown.add_column("parameter")
-    for column in ("value", "error so far", "expected", "with a multisine"):
-        shown.add_column(column, justify="right")
-    shown.add_column("unit")
+        shell.print(f"{part.kind.title}, {part.duration:.3g} s ({part.kind.id}: {settings})")
+    numeric = ("value", "error so far", "expected", "with a multisine")
+    shown = plain_table(("parameter", *numeric, "unit"), numeric)
     before, after = found.before, found.after(found.trial.best)
     generic = None if found.generic is None else found.after(found.generic)
     for k, name in enumerate(problem.free.names):
@@ -148,10 +133,10 @@ def print_design(found: Proposal, out: Path, written: list[str]) -> None:
         texts = [f"{value:.2g}" if math.isfinite(value) else "not known" for value in numbers]
         value = problem.model.values[problem.free.index[k]]
         shown.add_row(name, f"{value:.5g}", *texts, problem.model.unit(name))
-    console.print(shown)
+    shell.print(shown)
     for line in found.notes:
-        console.print(f"- {line}", highlight=False, markup=False)
+        shell.print(f"- {line}")
     for path in written:
-        console.print(f"written: {out / path}", highlight=False, markup=False)
+        shell.print(f"written: {out / path}")
     play = f"ros2 run fric_nodes excitation --ros-args --params-file {out / 'excitation.yaml'}"
-    console.print(f"play it: {play}", highlight=False, markup=False, soft_wrap=True)
+    shell.print(f"play it: {play}", soft_wrap=True)

@@ -1,4 +1,4 @@
-"""``fric import``: a recording in another format as a bag."""
+"""``fric import``: convert a recording in another format (.mat, .csv, .npz, .parquet, ...) into a bag."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def import_(
     repair: RepairOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Turn a recording into a rosbag2 that every other verb reads.
+    """Convert a recording into a rosbag2 bag, which every other command reads.
 
     The mapping names time, effort, and position or velocity; reference, normal_load, temperature and extra signals may follow.
-    Only the columns that it names are judged. A signal that was sampled at other times has a time of its own, as in effort:
+    Only the columns that it names are checked. A signal that was sampled at other times has a time of its own, as in effort:
     {from: torque, unit: N m, time: {from: t2, unit: ms}}. Its effort_hold says when a force acts: following (a controller's
     output, held from its stamp to the next), preceding or mean (over the sample before), linear (a continuous force), or
     unknown (the default: fits find it from the motion).

@@ -1,44 +1,105 @@
-"""The command ``fric``: finds its verbs, and turns every refusal into one line and exit status 2."""
+"""The command ``fric``: lists its verbs, imports the one that is called, and prints a refusal as one line with status 2.
+
+A verb is a file of this folder whose docstring begins with ``fric VERB`` in quotes and what it does, and which has a function
+``register(app)``. The list of ``fric --help`` is made from these lines without importing the verbs, or what they are built on.
+"""
 
 from __future__ import annotations
 
 import importlib
-import pkgutil
+import re
 import sys
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
+from fric import __version__
 from fric.errors import InputError
+from typer.core import TyperCommand, TyperGroup
 
-__all__ = ["build_app", "main"]
+__all__ = ["build_app", "main", "verbs"]
 
-_HELP = """Friction found, explained and compensated, on ROS 2.
+_HELP = """Friction of mechanical axes: recorded, identified, compensated and diagnosed, on ROS 2.
 
-Start with [bold]fric demo[/bold]; on a recording of your own, [bold]fric import[/bold] and [bold]fric identify[/bold]."""
+Start with [bold]fric demo[/bold]; with a recording of your own, [bold]fric import[/bold] and [bold]fric identify[/bold].
+Every command explains itself: [bold]fric COMMAND --help[/bold]."""
+
+_HEAD = re.compile(r'"""``fric (?P<verb>[a-z]+)(?: [A-Z]+)?``: (?P<text>.+?)(?:\.?"""|\.?\n)')
+
+
+@cache
+def verbs() -> dict[str, tuple[str, str]]:
+    """Module and short help of every verb, by its name."""
+    found = {}
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        with path.open(encoding="utf-8") as file:
+            head = _HEAD.match(file.readline())
+        # import_.py holds the verb import, which is no name that Python takes.
+        if head is not None and head["verb"] == path.stem.rstrip("_"):
+            text = head["text"].replace("``", "")
+            found[head["verb"]] = (f"{__package__}.{path.stem}", f"{text[0].upper()}{text[1:]}.")
+    return dict(sorted(found.items()))
+
+
+@cache
+def _loaded(name: str) -> Any:
+    """The command of a verb, which is imported for it."""
+    app = typer.Typer(rich_markup_mode="rich")
+    importlib.import_module(verbs()[name][0]).register(app)
+    return typer.main.get_group(app).commands[name]
+
+
+class _Verbs(TyperGroup):
+    """The verbs, each of which is imported when it is called."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Their names."""
+        return list(verbs())
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """A verb as the list shows it."""
+        return TyperCommand(cmd_name, help=verbs()[cmd_name][1]) if cmd_name in verbs() else None
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The verb that is called, and what follows its name."""
+        name, _, rest = super().resolve_command(ctx, args)
+        return name, None if name is None else _loaded(name), rest
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"fric {__version__}")
+        raise typer.Exit
+
+
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version and exit.", is_eager=True, callback=_show_version)
+    ] = False,
+) -> None:
+    pass
 
 
 def build_app() -> typer.Typer:
     """The command with all its verbs."""
     app = typer.Typer(
         name="fric",
+        cls=_Verbs,
         help=_HELP,
         no_args_is_help=True,
-        add_completion=False,
         rich_markup_mode="rich",
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    package = importlib.import_module(__package__ or "fric_nodes.cli")
-    for module_info in sorted(pkgutil.iter_modules(package.__path__), key=lambda info: info.name):
-        register = getattr(importlib.import_module(f"{package.__name__}.{module_info.name}"), "register", None)
-        if register is not None:
-            register(app)
+    app.callback()(_options)
     return app
 
 
 def main() -> None:
     """Entry point of the command ``fric``."""
     try:
-        build_app()()
+        build_app()(prog_name="fric")
     except InputError as error:
         # One line whatever the text holds.
         print(f"fric: {' '.join(str(error).split())}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""``fric model``: the schema of model files, what a model file says, and the catalogues that it draws on."""
+"""``fric model``: show model files, and list the effects, plants, excitations and methods that there are."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from .printed import console, plain_table
 
 __all__ = ["register"]
 
@@ -37,8 +39,6 @@ def show(
 ) -> None:
     """Print the equations and values of a model file."""
     from fric.model_file import read_model
-    from rich.console import Console
-    from rich.table import Table
 
     model = read_model(file)
     rows = [
@@ -58,23 +58,14 @@ def show(
         described = {"joint": model.joint, "plant": model.plant.equation, "equations": equations}
         typer.echo(json.dumps(described | {"parameters": [dict(zip(keys, row, strict=True)) for row in rows]}))
         return
-    console = Console(highlight=False)
-    console.print(f"{model.plant.title} '{model.joint}': {model.plant.equation}", markup=False)
+    out = console()
+    out.print(f"{model.plant.title} '{model.joint}': {model.plant.equation}")
     for held in model.terms:
-        console.print(f"  {held.effect.title}: {held.effect.equation}  ({held.effect.source})", markup=False)
-    table = Table(box=None, pad_edge=False)
-    for name, justify in (
-        ("parameter", "left"),
-        ("symbol", "left"),
-        ("value", "right"),
-        ("std", "right"),
-        ("unit", "left"),
-        ("", "left"),
-    ):
-        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+        out.print(f"  {held.effect.title}: {held.effect.equation}  ({held.effect.source})")
+    table = plain_table(("parameter", "symbol", "value", "std", "unit", ""), numbers=("value", "std"))
     for name, symbol, value, error, unit, doc in rows:
         table.add_row(name, symbol, f"{value:.6g}", "" if error is None else f"{error:.2g}", unit, doc)
-    console.print(table)
+    out.print(table)
 
 
 def effects(
@@ -142,12 +133,8 @@ def methods() -> None:
 
 
 def _list(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    from rich.console import Console
-    from rich.table import Table
 
-    table = Table(box=None, pad_edge=False)
-    for name in head:
-        table.add_column(name, overflow="fold")
+    table = plain_table(head)
     for row in rows:
         table.add_row(*row)
-    Console(highlight=False, markup=False).print(table)
+    console().print(table)

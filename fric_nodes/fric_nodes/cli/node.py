@@ -1,4 +1,4 @@
-"""``fric node NODE``: one node of the graph, as ``ros2 run fric_nodes NODE`` would start it."""
+"""``fric node NODE``: run one ROS 2 node, as ``ros2 run fric_nodes NODE`` does."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def node(
     context: typer.Context,
     name: Annotated[str, typer.Argument(help=f"One of {', '.join(NODES)}.")],
 ) -> None:
-    """Run one node; what follows its name goes to ROS (--ros-args -p name:=value ...)."""
+    """Run one ROS 2 node. Arguments after its name go to ROS, such as --ros-args -p name:=value."""
     if name not in NODES:
         raise InputError("fric node", f"no node '{name}'", f"choose one of {', '.join(NODES)}")
     sys.argv = [name, *context.args]

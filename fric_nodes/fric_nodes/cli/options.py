@@ -9,58 +9,57 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from fric.errors import InputError
 
+from .groups import Group
+
 if TYPE_CHECKING:
     from fric.bagio.topics import Topics
     from fric.record import Record
 
 __all__ = [
     "EndOption",
-    "JointOption",
-    "JointsOption",
     "JsonOption",
     "OutOption",
-    "ReadOptions",
+    "Reading",
+    "ReadingGroup",
     "RepairOption",
     "StartOption",
-    "TimeOption",
-    "TopicOption",
     "progress",
     "read_all",
 ]
 
-JointOption = Annotated[str | None, typer.Option("--joint", help="Name of the joint, where a recording holds several.")]
-JointsOption = Annotated[
-    str | None, typer.Option("--joint", help="Name of the joint, where a recording holds several; 'all' for each of them.")
-]
 RepairOption = Annotated[
-    bool, typer.Option("--repair", help="Drop or mark bad samples instead of refusing the recording; says what was dropped.")
+    bool, typer.Option("--repair", help="Drop or mark bad samples instead of refusing the recording; each is reported.")
 ]
-TimeOption = Annotated[str, typer.Option("--time", help="Take time from the messages' own 'stamp' or from the 'log'.")]
-StartOption = Annotated[float | None, typer.Option("--start", help="Leave out what comes before this time [s].")]
-EndOption = Annotated[float | None, typer.Option("--end", help="Leave out what comes after this time [s].")]
-TopicOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--topic",
-        help="Another topic name, such as joint_states=/robot/joint_states; may be repeated. Which number of a message is "
-        "meant stands behind a colon: force_command=/arm/commands:0 is the first value of a list, "
-        ":shoulder,elbow gives the joints in the order of its values, effort=/ft/wrench:wrench.force.z names a field.",
-    ),
-]
+StartOption = Annotated[float | None, typer.Option("--start", help="Leave out what was recorded before this time, in s.")]
+EndOption = Annotated[float | None, typer.Option("--end", help="Leave out what was recorded after this time, in s.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, for programs.")]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results; made when missing.")]
 
 
 @dataclass(frozen=True)
-class ReadOptions:
+class Reading:
     """How recordings are read."""
 
-    joint: str | None = None
-    repair: bool = False
-    time: str = "stamp"
-    start: float | None = None
-    end: float | None = None
-    topics: tuple[str, ...] = ()
+    joint: Annotated[str | None, typer.Option("--joint", help="Name of the joint, if the recording holds several.")] = None
+    repair: RepairOption = False
+    time: Annotated[
+        str,
+        typer.Option(
+            "--time", help="Clock of the samples: 'stamp' is the time in each message, 'log' the time at which it was recorded."
+        ),
+    ] = "stamp"
+    start: StartOption = None
+    end: EndOption = None
+    topic: Annotated[
+        tuple[str, ...],
+        typer.Option(
+            "--topic",
+            help="Read a signal from another topic, such as joint_states=/robot/joint_states; may be repeated. A colon selects "
+            "one number of a message: force_command=/arm/commands:0 is the first value of a list, "
+            "force_command=/arm/commands:shoulder,elbow names the joints in the order of its values, "
+            "effort=/ft/wrench:wrench.force.z is a field.",
+        ),
+    ] = ()
 
     def topic_names(self) -> Topics:
         """Names of the topics.
@@ -71,7 +70,7 @@ class ReadOptions:
         from fric.bagio.topics import Topics
 
         names = {}
-        for entry in self.topics:
+        for entry in self.topic:
             role, found, name = entry.partition("=")
             if not found or not name.partition(":")[0].strip() or role not in Topics.__dataclass_fields__:
                 roles = ", ".join(Topics.__dataclass_fields__)
@@ -80,7 +79,11 @@ class ReadOptions:
         return Topics(**names)
 
 
-def read_all(paths: list[Path], options: ReadOptions) -> list[Record]:
+ReadingGroup = Annotated[Reading, Group("Reading the recordings")]
+"""How recordings are read, as a parameter of a command."""
+
+
+def read_all(paths: list[Path], reading: Reading) -> list[Record]:
     """The recordings at ``paths``, with end stops and saturation left out.
 
     Raises:
@@ -89,19 +92,19 @@ def read_all(paths: list[Path], options: ReadOptions) -> list[Record]:
     from fric.bagio.read import read_record
     from fric.identification.screen import screened
 
-    if options.time not in {"stamp", "log"}:
-        raise InputError("--time", f"'{options.time}' is not known", "use stamp or log")
-    topics = options.topic_names()
+    if reading.time not in {"stamp", "log"}:
+        raise InputError("--time", f"'{reading.time}' is not known", "use stamp or log")
+    topics = reading.topic_names()
     return [
         screened(
             read_record(
                 path,
-                joint=options.joint,
+                joint=reading.joint,
                 topics=topics,
-                time="log" if options.time == "log" else "stamp",
-                repair=options.repair,
-                start=options.start,
-                end=options.end,
+                time="log" if reading.time == "log" else "stamp",
+                repair=reading.repair,
+                start=reading.start,
+                end=reading.end,
             )
         )
         for path in paths

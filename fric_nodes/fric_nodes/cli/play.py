@@ -1,4 +1,4 @@
-"""``fric play``: a bag into the running graph."""
+"""``fric play``: publish a bag into the running ROS graph."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ def register(app: typer.Typer) -> None:
 
 def play(
     bag: Annotated[Path, typer.Argument(help="Bag to play: a rosbag2 folder, or a .mcap or .db3 file.")],
-    rate: Annotated[float, typer.Option("--rate", help="Speed relative to the recording; 0: without a pace.")] = 1.0,
+    rate: Annotated[float, typer.Option("--rate", help="Speed relative to the recording; 0: as fast as possible.")] = 1.0,
     start: StartOption = None,
     end: EndOption = None,
-    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end, until Ctrl-C.")] = False,
-    topic: Annotated[list[str] | None, typer.Option("--topic", help="Topic to play; may be repeated; all.")] = None,
+    loop: Annotated[bool, typer.Option("--loop", help="Play again from the start, until Ctrl-C.")] = False,
+    topic: Annotated[
+        list[str] | None, typer.Option("--topic", help="Topic to play; may be repeated. If not given: all.")
+    ] = None,
     clock: Annotated[bool, typer.Option("--clock", help="Publish the time of the recording on /clock.")] = False,
-    wait: Annotated[int, typer.Option("--wait", help="Wait for this many subscriptions before playing.")] = 0,
+    wait: Annotated[int, typer.Option("--wait", help="Wait for this many subscribers before playing.")] = 0,
 ) -> None:
     """Publish a recording into the running graph, the same messages in the same order."""
     from ..nodes.player import main

@@ -1,4 +1,4 @@
-"""``fric prove``: examine the diagnosis on plants with concealed physics, and say how often it is right."""
+"""``fric prove``: measure how often the diagnosis is right, on simulated axes whose true physics is kept from it."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ def register(app: typer.Typer) -> None:
 
 def prove(
     out: OutOption,
-    cases: Annotated[int, typer.Option("--cases", help="How many cases.")] = 300,
-    seed: Annotated[int, typer.Option("--seed", help="Of all cases; the same seed conceals the same physics.")] = 1,
+    cases: Annotated[int, typer.Option("--cases", help="Number of simulated axes.")] = 300,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the random numbers; the same seed draws the same cases.")] = 1,
     variant: Annotated[
         str,
         typer.Option(
             "--variant",
-            help="standard, form (laws other than the usual ones), foreign (laws that fric has not), half-rate, double-rate, "
-            "mixed (with other physics), or slow-log (one of several samples).",
+            help="standard; form (other laws of the same effects); foreign (laws that fric does not have); half-rate; "
+            "double-rate; mixed (effects beside unknown physics); slow-log (only every n-th sample is logged).",
         ),
     ] = "standard",
-    jobs: Annotated[int | None, typer.Option("--jobs", help="Processes; as many as there are cores when not given.")] = None,
+    jobs: Annotated[int | None, typer.Option("--jobs", help="Number of processes. If not given: one per core.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Examine the diagnosis; exit status 1 when a goal is missed. A run that was stopped goes on in the same folder."""
+    """Measure how often the diagnosis is right; exit status 1 when a goal is missed. A stopped run continues in its folder."""
     from fric.diagnosis.prove.examination import hold
     from fric.files import write_text
     from fric.report.prove import prove_page

@@ -1,4 +1,4 @@
-"""``fric record``: topics of the running graph into a bag."""
+"""``fric record``: record topics of the running ROS graph into a bag."""
 
 from __future__ import annotations
 
@@ -21,11 +21,17 @@ def record(
     all_topics: Annotated[bool, typer.Option("--all", help="Record every topic.")] = False,
     storage: Annotated[str, typer.Option("--storage", help="mcap or sqlite3.")] = "mcap",
     compression: Annotated[str, typer.Option("--compression", help="none or zstd.")] = "none",
-    joint: Annotated[str, typer.Option("--joint", help="Name of the joint, for those who read the bag.")] = "axis",
+    joint: Annotated[str, typer.Option("--joint", help="Name of the joint, written into the bag.")] = "axis",
     effort_hold: Annotated[
-        str, typer.Option("--effort-hold", help="When a recorded effort acts: preceding, following, linear, or unknown.")
+        str,
+        typer.Option(
+            "--effort-hold",
+            help="How effort acts between samples: following (from its stamp on), preceding (up to it), linear, unknown.",
+        ),
     ] = "unknown",
-    log_time: Annotated[str, typer.Option("--log-time", help="receive, or the messages' own stamp.")] = "receive",
+    log_time: Annotated[
+        str, typer.Option("--log-time", help="Time of each message in the bag: receive (when it arrived) or stamp (its own).")
+    ] = "receive",
 ) -> None:
     """Record until Ctrl-C; a recorder that is killed leaves a bag that every verb reads."""
     from ..nodes.recorder import main

@@ -1,4 +1,4 @@
-"""``fric simulate``: the motion of a model under the forces of a recording, or in closed loop under its reference, as a bag."""
+"""``fric simulate``: simulate a model under a recorded force or reference, and write the motion as a bag."""
 
 from __future__ import annotations
 
@@ -10,17 +10,8 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 from fric.errors import InputError
 
-from .options import (
-    EndOption,
-    JointOption,
-    JsonOption,
-    ReadOptions,
-    RepairOption,
-    StartOption,
-    TimeOption,
-    TopicOption,
-    read_all,
-)
+from .groups import grouped
+from .options import JsonOption, Reading, ReadingGroup, read_all
 
 if TYPE_CHECKING:
     from fric.model import Model
@@ -38,25 +29,21 @@ def register(app: typer.Typer) -> None:
     )(simulate)
 
 
+@grouped
 def simulate(
     model: Annotated[Path, typer.Argument(help="A fric-model/1 file.")],
     out: Annotated[Path, typer.Option("--out", help="Folder of the bag to write; must not exist.")],
     force: Annotated[
-        Path | None, typer.Option("--force", help="Free run: the recording whose force leads the model.", show_default=False)
+        Path | None, typer.Option("--force", help="Free run: the recording whose force drives the model.", show_default=False)
     ] = None,
     closed_loop: Annotated[
         Path | None,
-        typer.Option("--closed-loop", help="Closed loop: a fric-controller/1 file (see control/controller_file.py)."),
+        typer.Option("--closed-loop", help="Closed loop: controller file (fric-controller/1) that drives the model."),
     ] = None,
     reference: Annotated[
-        Path | None, typer.Option("--reference", help="Closed loop: the recording whose reference is followed.")
+        Path | None, typer.Option("--reference", help="Closed loop: the recording whose reference the controller follows.")
     ] = None,
-    joint: JointOption = None,
-    repair: RepairOption = False,
-    time: TimeOption = "stamp",
-    start: StartOption = None,
-    end: EndOption = None,
-    topic: TopicOption = None,
+    reading: ReadingGroup = Reading(),
     as_json: JsonOption = False,
 ) -> None:
     """Simulate a model in a free run under a recorded force, or in closed loop under a recorded reference.
@@ -69,16 +56,15 @@ def simulate(
     if (force is None) == (closed_loop is None) or (closed_loop is None) != (reference is None):
         raise InputError(
             "fric simulate",
-            "no single way to lead the model",
+            "needs one source of the force",
             "give --force BAG, or --closed-loop CONTROLLER.yaml --reference BAG",
         )
     held = read_model(model)
-    options = ReadOptions(joint, repair, time, start, end, tuple(topic or ()))
     if closed_loop is not None and reference is not None:
-        shown = _in_closed_loop(held, model, closed_loop, _recorded(reference, options, held), out)
+        shown = _in_closed_loop(held, model, closed_loop, _recorded(reference, reading, held), out)
     else:
         assert force is not None
-        shown = _free_run(held, model, force, _recorded(force, options, held), out)
+        shown = _free_run(held, model, force, _recorded(force, reading, held), out)
     typer.echo(json.dumps(shown.as_json) if as_json else shown.text)
 
 
@@ -89,9 +75,9 @@ class _Shown(NamedTuple):
     text: str
 
 
-def _recorded(path: Path, options: ReadOptions, model: Model) -> Record:
+def _recorded(path: Path, reading: Reading, model: Model) -> Record:
     """The recording, evenly sampled, with the conditions at which the model's values hold."""
-    return replace(read_all([path], options)[0].uniform(), nominal=model.nominal)
+    return replace(read_all([path], reading)[0].uniform(), nominal=model.nominal)
 
 
 def _free_run(held: Model, model: Path, force: Path, record: Record, out: Path) -> _Shown:

@@ -1,4 +1,4 @@
-"""``fric verify``: hold the physics against papers, closed forms and conservation laws, and write it all on a page."""
+"""``fric verify``: check the implemented physics against papers, closed forms and conservation laws."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def register(app: typer.Typer) -> None:
 
 
 def verify(
-    names: Annotated[list[str] | None, typer.Argument(help="Which verifications; all when none is named.")] = None,
-    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write.")] = Path("verification.html"),
+    names: Annotated[list[str] | None, typer.Argument(help="Names of verifications. If none is given: all.")] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Page to write.")] = Path("verification.html"),
     as_json: JsonOption = False,
 ) -> None:
     """Verify the physics; exit status 1 when a goal is missed."""

@@ -30,6 +30,7 @@ import numpy as np
 from scipy import signal
 from scipy.optimize import minimize_scalar
 
+from ...method_settings import FILTER
 from ...model import Model
 from ...record import Array, Mask, Record
 from ..conclusion import Fitted, concluded
@@ -380,7 +381,7 @@ def _result(
         ]
     rows = equations(judged, options)
     notes = [_note(run) for run in runs]
-    result = concluded(METHOD.id, Fitted(structure.with_values(values), free, spread, rows, messages), judged, options)
+    result = concluded(METHOD, Fitted(structure.with_values(values), free, spread, rows, messages), judged, options)
     return replace(result, notes=(*notes, *result.notes))
 
 
@@ -396,4 +397,5 @@ METHOD = Method(
     needs="steady runs under a sinusoidal force, one recording each, at different frequencies and amplitudes",
     source="de Marchi 1998",
     fit=fit,
+    uses=(*FILTER, "held", "gains"),
 )

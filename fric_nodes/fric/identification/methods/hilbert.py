@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import signal
 
+from ...method_settings import FILTER
 from ...model import Model
 from ...record import Array, Mask, Record
 from ..oscillation.conclusion import ALL, identified
@@ -68,4 +69,5 @@ METHOD = Method(
     source="Feldman 1994; de Marchi 1998",
     fit=fit,
     needs_force=False,
+    uses=(*FILTER, "held", "gains"),
 )

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
+from ...method_settings import FILTER, PARAMETERS
 from ...model import Model
 from ...record import Array, Mask, Record
 from ..conclusion import Fitted, concluded
@@ -298,7 +299,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     Raises:
         IdentificationError: the recordings can't determine it.
     """
-    return concluded(METHOD.id, fit_force(structure, records, options), records, options)
+    return concluded(METHOD, fit_force(structure, records, options), records, options)
 
 
 METHOD = Method(
@@ -308,4 +309,5 @@ METHOD = Method(
     source="Gautier 1997; Janot, Gautier, Brunot 2019",
     fit=fit,
     predicts="force",
+    uses=(*FILTER, *PARAMETERS, "robust"),
 )

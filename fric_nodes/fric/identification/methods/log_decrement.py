@@ -18,6 +18,7 @@ import numpy as np
 from scipy import stats
 from scipy.optimize import least_squares
 
+from ...method_settings import FILTER
 from ...model import Model
 from ...record import Array, Mask, Record
 from ..oscillation.conclusion import ALL, identified
@@ -144,4 +145,5 @@ METHOD = Method(
     source="de Marchi 1998",
     fit=fit,
     needs_force=False,
+    uses=(*FILTER, "held", "gains"),
 )

@@ -25,6 +25,7 @@ from itertools import islice
 import numpy as np
 
 from ...errors import InputError
+from ...method_settings import FILTER, PARAMETERS
 from ...model import Model
 from ...record import Array, Record
 from ..agreement import reconciled
@@ -234,7 +235,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
         trouble = f"not converged after {best.answer.iterations} steps; {remedy}"
     covariance, doubts = reconciled(best.model, free, covariance, begun)
     fitted = Fitted(best.model, free, covariance, found, [*messages, *doubts])
-    result = concluded(METHOD.id, fitted, records, options, trouble)
+    result = concluded(METHOD, fitted, records, options, trouble)
     if options.starts <= 1:
         return result
     fitted_errors = dict(zip(free.names, np.sqrt(np.diag(covariance)), strict=True))
@@ -275,4 +276,5 @@ METHOD = Method(
     source="Ljung 1999, chapter 7; multiple shooting: Bock 1983",
     fit=fit,
     predicts="position",
+    uses=(*FILTER, *PARAMETERS, "horizon", "starts", "start_states", "continuity"),
 )

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from ...method_settings import FILTER
 from ...model import Model
 from ...record import Array, Record
 from ..mechanics import Mechanics
@@ -264,4 +265,5 @@ METHOD = Method(
     source="de Marchi 1998",
     fit=fit,
     needs_force=False,
+    uses=(*FILTER, "held", "gains"),
 )

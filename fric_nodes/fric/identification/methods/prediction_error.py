@@ -42,6 +42,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import savgol_filter
 
+from ...method_settings import FILTER, PARAMETERS
 from ...model import Model
 from ...record import Array, Index, Record
 from ...simulation import substeps
@@ -314,7 +315,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     trouble = "" if answer.converged else f"not converged after {_MOST_STEPS} steps; {remedy}"
     covariance, doubts = reconciled(model, free, covariance, begun, unsuited(records))
     fitted = Fitted(model, free, covariance, found, [*begun.messages, *doubts])
-    return concluded(METHOD.id, fitted, records, options, trouble)
+    return concluded(METHOD, fitted, records, options, trouble)
 
 
 METHOD = Method(
@@ -324,4 +325,5 @@ METHOD = Method(
     source="Ljung 1999, sections 7.2 and 7.4",
     fit=fit,
     predicts="position",
+    uses=(*FILTER, *PARAMETERS),
 )

@@ -391,4 +391,5 @@ METHOD = Method(
     needs="constant velocities in both directions, from the slowest that runs smoothly; reversals, best at several loads",
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994; Szell, Sec. 4.2",
     fit=fit,
+    uses=("rest_velocity",),
 )

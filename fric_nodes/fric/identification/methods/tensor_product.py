@@ -21,6 +21,7 @@ import numpy as np
 
 from ...friction.tensor_product import TensorProductFriction, from_points
 from ...friction.tensor_product_file import tensor_product_to_text
+from ...method_settings import FILTER
 from ...model import Model
 from ...record import Array, Record
 from ..free_parameters import FreeParameters
@@ -256,4 +257,5 @@ METHOD = Method(
     needs="motion that speeds up from rest and slows down to it, best stick-slip with its acceleration measured; a known mass",
     source="Szell, Secs. 2 and 5 (Model D)",
     fit=fit,
+    uses=FILTER,
 )

@@ -29,6 +29,7 @@ import numpy as np
 
 from ...effect import Place
 from ...friction.dnlrx_file import dnlrx_to_text
+from ...method_settings import FILTER
 from ...model import Model, Term, term
 from ...record import Record
 from ..conclusion import standard_errors
@@ -217,4 +218,5 @@ METHOD = Method(
     needs="strokes of graded amplitude from the sensor's noise to sliding, the longest first; position and force at one rate",
     source="Amthor et al. 2008; Rizos and Fassois 2005",
     fit=fit,
+    uses=(*FILTER, "held"),
 )

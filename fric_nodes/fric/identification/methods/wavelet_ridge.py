@@ -17,6 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...method_settings import FILTER
 from ...model import Model
 from ...record import Array, Mask, Record
 from ..oscillation.conclusion import ALL, identified
@@ -83,4 +84,5 @@ METHOD = Method(
     source="Ruzzene, Fasana, Garibaldi, Piombo 1997; de Marchi 1998",
     fit=fit,
     needs_force=False,
+    uses=(*FILTER, "held", "gains"),
 )
