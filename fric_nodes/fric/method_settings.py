@@ -175,13 +175,17 @@ PARAMETERS = ("held", "freed", "bounds")
 """Settings that say which parameters are fitted, and within which limits."""
 
 
-@cache
-def declarations(kind: type[Options] = Options) -> Mapping[str, tuple[Any, Setting]]:
-    """Type and declaration of each setting, by the name of its field.
+def declarations(kind: type[Options] | None = None) -> Mapping[str, tuple[Any, Setting]]:
+    """Type and declaration of each setting, by the name of its field; the common ones when no type is given.
 
     Raises:
         TypeError: a field has no declaration.
     """
+    return _declarations(Options if kind is None else kind)
+
+
+@cache
+def _declarations(kind: Any) -> Mapping[str, tuple[Any, Setting]]:
     found = {}
     for name, hint in get_type_hints(kind, include_extras=True).items():
         held = [each for each in get_args(hint)[1:] if isinstance(each, Setting)] if get_origin(hint) is Annotated else []

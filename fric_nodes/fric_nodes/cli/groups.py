@@ -82,7 +82,7 @@ def _option_of(kind: type[Any], each: Field[Any], hint: Any, group: Group, defau
     option = next((mark for mark in marks if isinstance(mark, (OptionInfo, Setting))), None)
     if option is None:
         raise TypeError(f"{kind.__name__}.{each.name} is no option: annotate it with typer.Option or Setting")
-    value = each.default if default is inspect.Parameter.empty else getattr(default, each.name)
+    value: Any = each.default if default is inspect.Parameter.empty else getattr(default, each.name)
     if get_origin(held) is tuple:
         held, value = list[str] | None, list(value) or None
     if isinstance(option, Setting):

@@ -11,7 +11,7 @@ import re
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from fric import __version__
@@ -22,10 +22,14 @@ __all__ = ["build_app", "main", "verbs"]
 
 _HELP = """Friction of mechanical axes: recorded, identified, compensated and diagnosed, on ROS 2.
 
-Start with [bold]fric demo[/bold]; with a recording of your own, [bold]fric import[/bold] and [bold]fric identify[/bold].
-Every command explains itself: [bold]fric COMMAND --help[/bold]."""
+Start with 'fric demo'; with a recording of your own, 'fric import' and 'fric identify'. Every command explains itself:
+'fric COMMAND --help'."""
 
 _HEAD = re.compile(r'"""``fric (?P<verb>[a-z]+)(?: [A-Z]+)?``: (?P<text>.+?)(?:\.?"""|\.?\n)')
+
+
+_UsageError: Any = typer.BadParameter.__mro__[1]
+"""A wrong option or argument; typer has no public name for it."""
 
 
 @cache
@@ -59,7 +63,7 @@ class _Verbs(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """A verb as the list shows it."""
-        return TyperCommand(cmd_name, help=verbs()[cmd_name][1]) if cmd_name in verbs() else None
+        return TyperCommand(cmd_name, short_help=verbs()[cmd_name][1]) if cmd_name in verbs() else None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The verb that is called, and what follows its name."""
@@ -88,7 +92,7 @@ def build_app() -> typer.Typer:
         cls=_Verbs,
         help=_HELP,
         no_args_is_help=True,
-        rich_markup_mode="rich",
+        rich_markup_mode=None,  # a plain list: what draws the frames takes longer to import than all the rest
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
@@ -96,14 +100,26 @@ def build_app() -> typer.Typer:
     return app
 
 
+def _refuse(text: str) -> NoReturn:
+    """One line whatever the text holds."""
+    print(f"fric: {' '.join(text.split())}", file=sys.stderr)
+    sys.exit(2)
+
+
 def main() -> None:
     """Entry point of the command ``fric``."""
     try:
-        build_app()(prog_name="fric")
+        status = build_app()(prog_name="fric", standalone_mode=False)
+        sys.exit(status if isinstance(status, int) else 0)
     except InputError as error:
-        # One line whatever the text holds.
-        print(f"fric: {' '.join(str(error).split())}", file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt:
+        _refuse(str(error))
+    except _UsageError as error:
+        if type(error).__name__ == "NoArgsIsHelpError":
+            error.show()
+            sys.exit(2)
+        path = error.ctx.command_path if error.ctx is not None else "fric"
+        subject = f"{path.removeprefix('fric ')}: " if " " in path else ""
+        _refuse(f"{subject}{error.format_message().rstrip('.')}; see '{path} --help'")
+    except (KeyboardInterrupt, typer.Abort):
         print("fric: stopped", file=sys.stderr)
         sys.exit(130)

@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+from fric.method_settings import declarations, own_settings
 
 from .printed import console, plain_table
+
+if TYPE_CHECKING:
+    from fric.identification.result import Method
 
 __all__ = ["register"]
 
@@ -126,10 +130,19 @@ def excitations() -> None:
 
 
 def methods() -> None:
-    """List the methods of identification, and the experiment that each of them needs."""
+    """List the methods of identification: the experiment that each needs, and the settings that it uses."""
     from fric.identification import METHODS
 
-    _list(("method", "needs", "source"), ((key, method.needs, method.source) for key, method in METHODS.items()))
+    _list(
+        ("method", "needs", "settings", "source"),
+        ((key, each.needs, ", ".join(_settings_of(each)), each.source) for key, each in METHODS.items()),
+    )
+
+
+def _settings_of(method: Method) -> list[str]:
+    """The options of ``fric identify`` that a method uses; its own ones as they are given with --set."""
+    declared, own = declarations(method.settings), own_settings(method.settings)
+    return [f"--set {name}" if name in own else declared[name][1].option for name in method.honoured]
 
 
 def _list(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
