@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fric.bagio import write_record
+from fric.diagnosis.align import Alignment
 from fric.diagnosis.compare import CompareError, compare
 from fric.errors import InputError
 from fric.record import Array, Record, Units
+from fric.report.compare import comparison_report
 from fric_nodes.cli.main import build_app
 from typer.testing import CliRunner
 
@@ -53,11 +55,11 @@ def real(first: float = 2.0, seconds: float = 12.0, rate: float = 800.0, noise: 
 def test_offset_and_ratio_of_the_clocks_are_found_between_the_samples() -> None:
     found = compare(simulated(), real())
     expected = OFFSET - RATIO * 2.0
-    assert found.offset == pytest.approx(expected, abs=1e-5)
-    assert found.ratio == pytest.approx(RATIO, abs=2e-6)
-    assert abs(found.offset - expected) < 4.0 * found.offset_error
-    assert abs(found.ratio - RATIO) < 4.0 * found.ratio_error
-    assert found.offset_error < 1e-5
+    assert found.clocks.offset == pytest.approx(expected, abs=1e-5)
+    assert found.clocks.ratio == pytest.approx(RATIO, abs=2e-6)
+    assert abs(found.clocks.offset - expected) < 4.0 * found.clocks.offset_error
+    assert abs(found.clocks.ratio - RATIO) < 4.0 * found.clocks.ratio_error
+    assert found.clocks.offset_error < 1e-5
     held = {each.signal: each for each in found.agreements}
     assert held["position"].rmse == pytest.approx(1e-6, rel=0.1)
     assert held["effort"].rmse == pytest.approx(0.2, rel=0.15)
@@ -79,6 +81,50 @@ def test_the_figures_are_those_of_their_definitions_and_the_regime_is_found() ->
     assert found.where is not None
     assert found.where.quantity == "speed"
     assert found.where.range[1] == pytest.approx(0.03, rel=0.35)
+
+
+def drifting(more: float) -> Record:
+    """A free run of a model with too little friction: it has the force of the real one, and moves further and further away."""
+    time = np.arange(12_000) / 1000.0
+    return Record(time, place(time) + more * (0.1 * time**2 + 0.3 * np.sin(0.9 * time)), force(time), source="simulated")
+
+
+def test_what_the_recordings_do_not_determine_is_not_stated() -> None:
+    """An error of the free run that grows to many times the travel: no share of it, and no time shift to a millisecond."""
+    found = compare(drifting(0.05), real(first=0.0))
+    position = next(each for each in found.agreements if each.signal == "position")
+    assert position.noe > 1000.0
+    assert not position.is_share
+    assert found.drifts
+    assert f"{position.noe:.3g} %" not in found.sentence
+    assert "the position drifts" in found.sentence
+    assert not found.clocks.ratio_told
+    assert found.clocks.ratio_in_words.startswith("cannot be told from this recording")
+    assert found.report()["clock_ratio"]["determined"] is False  # type: ignore[index]
+    page = comparison_report(found)
+    assert f"{position.noe:.3g} %" not in page
+    assert "no share is stated" in page
+    sure = compare(simulated(), real())
+    assert sure.clocks.offset_told
+    assert sure.clocks.ratio_told
+    assert not sure.drifts
+
+
+def test_efforts_align_where_the_motion_drifts_away() -> None:
+    found = compare(drifting(0.2), real(first=0.0))
+    assert found.clocks.by_effort
+    # At the middle of the recording, since the ratio of the clocks is not told.
+    assert found.clocks.offset == pytest.approx(OFFSET + 6.0 * (RATIO - 1.0), abs=2.5e-3)
+    effort = next(each for each in found.agreements if each.signal == "effort")
+    assert effort.noe < 1.0
+
+
+def test_an_offset_that_is_wider_than_the_motion_is_not_stated() -> None:
+    wide = Alignment(0.2, 0.7, 1.0, 1e-5, motion_time=0.05)
+    assert not wide.offset_told
+    assert wide.offset_in_words.startswith("cannot be told from this recording")
+    assert "0.7" not in wide.offset_in_words
+    assert "± 1.4 s" in Alignment(0.2, 0.7, 1.0, 1e-5, motion_time=20.0).offset_in_words
 
 
 def test_what_cannot_be_compared_is_refused() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..diagnosis.compare import Comparison
+from ..diagnosis.compare import Agreement, Comparison
 from .figures import Curve, shaded, stacked
 from .kind import Report
 from .numbers import significant
@@ -17,9 +17,10 @@ _MOST_SPANS = 120  # drawn; a page with thousands of them is slow
 
 def comparison_report(found: Comparison) -> str:
     """The page as text."""
-    held = {each.signal: each for each in found.agreements}
-    entries = [(f"{each.noe:.3g} %", f"normalised output error of the {name}") for name, each in held.items()]
-    entries.append((f"{1e3 * found.offset:.4g} ms", f"offset, +- {1.96e3 * found.offset_error:.2g} ms (95 %)"))
+    entries = [_tile(each) for each in found.agreements]
+    if found.clocks.offset_told:
+        limit = f"± {1e3 * (found.clocks.interval[1] - found.clocks.offset):.2g} ms (95 %)"
+        entries.append((f"{1e3 * found.clocks.offset:.4g} ms", f"offset of the clocks, {limit}"))
     sections = [
         Section("", (paragraph(found.sentence, "verdict"), tiles(entries))),
         _signals(found),
@@ -32,6 +33,16 @@ def comparison_report(found: Comparison) -> str:
     return render(f"Simulated and real: '{found.joint}'", lead, sections)
 
 
+def _tile(each: Agreement) -> tuple[str, str]:
+    """A signal's difference as a share of its spread, or in its unit where it is no share."""
+    if each.is_share:
+        return f"{each.noe:.3g} %", f"of the spread of the {each.signal} differ (normalised output error)"
+    return (
+        f"{significant(each.rmse, 3)} {each.unit}",
+        f"RMS difference of the {each.signal}, more than it moves about its mean: no share is stated",
+    )
+
+
 def _signals(found: Comparison) -> Section:
     head = ("signal", "RMSE", "mean difference", "largest", "unit", "NOE [%]", "correlation")
     rows = [
@@ -41,12 +52,15 @@ def _signals(found: Comparison) -> Section:
             significant(each.bias),
             significant(each.largest),
             each.unit,
-            significant(each.noe),
+            significant(each.noe) if each.is_share else "no share",
             f"{each.correlation:.5f}",
         )
         for each in found.agreements
     ]
-    note = "Difference: simulated minus real. NOE: energy of the difference over that of the real signal about its mean."
+    note = (
+        "Difference: simulated minus real. NOE: energy of the difference over that of the real signal about its mean; beyond "
+        "100 % a constant would do as well, and no share is stated."
+    )
     return Section("How well they agree", (table(head, rows, text_columns=(0, 4)), paragraph(note, "note")))
 
 
@@ -73,18 +87,13 @@ def _figures(found: Comparison) -> Section:
 
 
 def _alignment(found: Comparison) -> Section:
-    low, high = found.interval
     rows = [
-        ("offset of the clocks [s]", f"{found.offset:.6f}", f"{low:.6f} to {high:.6f}"),
-        (
-            "ratio of the clocks",
-            f"{found.ratio:.8f}",
-            f"{found.ratio - 1.96 * found.ratio_error:.8f} to {found.ratio + 1.96 * found.ratio_error:.8f}",
-        ),
-        ("time in common [s]", significant(float(np.ptp(found.time))), ""),
+        ("offset of the clocks", found.clocks.offset_in_words),
+        ("ratio of the clocks", found.clocks.ratio_in_words),
+        ("time in common", f"{significant(float(np.ptp(found.time)))} s"),
     ]
     note = "A time of the real recording is the offset plus the ratio times the simulated one's."
-    return Section("Alignment in time", (table(("", "value", "95 % interval"), rows), paragraph(note, "note")))
+    return Section("Alignment in time", (table(("", "value"), rows, text_columns=(0, 1)), paragraph(note, "note")))
 
 
 REPORT = Report(Comparison, lambda found, train, validation, options: comparison_report(found))

@@ -128,6 +128,13 @@ def _correlation_section(result: Identification) -> Section:
     return Section("Correlation of the estimates", (table(("", *result.fitted), padded), paragraph(note, "note")))
 
 
+_FREE_RUN = (
+    "The position error of a free run is no measure of the force error: the simulated position is the force error integrated "
+    "twice, with nothing that corrects it, so it drifts even where the force is described to a few percent. It says how long "
+    "a simulation without feedback follows the machine."
+)
+
+
 def identification_report(
     result: Identification, train: Sequence[Record], validation: Sequence[Record], options: Options
 ) -> str:
@@ -156,10 +163,14 @@ def identification_report(
                 tiles(
                     [
                         (f"{score.relative_force_error_percent:.3g} %", f"relative force error {which}"),
-                        (f"{score.noe:.3g} %", f"normalised output error {which}"),
-                        (f"{significant(score.position_rmse, 3)} {units.position}", f"position error of a free run {which}"),
+                        (f"{score.noe:.3g} %", f"of the force's variance left over (normalised output error), {which}"),
+                        (
+                            f"{significant(score.position_rmse, 3)} {units.position}",
+                            f"position error (RMS) of a simulation from the force alone (free run), {which}",
+                        ),
                     ]
                 ),
+                paragraph(_FREE_RUN, "note"),
                 paragraph(f"Status: {result.status}."),
             ),
         ),

@@ -51,17 +51,22 @@ def tiles(entries: Iterable[tuple[str, str]]) -> str:
 def table(
     head: Sequence[str], rows: Iterable[Sequence[str]], text_columns: Sequence[int] = (0,), wrap: Sequence[int] = ()
 ) -> str:
-    """A table; columns not in ``text_columns`` are set as numbers, those in ``wrap`` may break."""
+    """A table; columns not in ``text_columns`` are set as numbers, those in ``wrap`` may break even where there is room.
+
+    On a narrow screen each row becomes a block of lines, a heading and a value each, so that nothing lies outside the page.
+    """
 
     def kind(column: int) -> str:
-        names = [] if column in text_columns else ["number"]
+        names = ["text"] if column in text_columns else ["number"]
         names += ["wrap"] if column in wrap else []
-        return f' class="{" ".join(names)}"' if names else ""
+        return f' class="{" ".join(names)}"'
 
-    header = "".join(f"<th{kind(k)}>{escape(cell)}</th>" for k, cell in enumerate(head))
-    body = "".join(
-        "<tr>" + "".join(f"<td{kind(k)}>{escape(cell)}</td>" for k, cell in enumerate(row)) + "</tr>" for row in rows
-    )
+    def cell(column: int, text: str) -> str:
+        heading = escape(head[column]) if column < len(head) else ""
+        return f'<td{kind(column)} data-head="{heading}">{escape(text)}</td>'
+
+    header = "".join(f"<th{kind(k)}>{escape(each)}</th>" for k, each in enumerate(head))
+    body = "".join("<tr>" + "".join(cell(k, text) for k, text in enumerate(row)) + "</tr>" for row in rows)
     return f'<div class="scroll"><table><thead><tr>{header}</tr></thead><tbody>{body}</tbody></table></div>'
 
 

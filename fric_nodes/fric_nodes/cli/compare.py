@@ -47,10 +47,8 @@ def compare(
         typer.echo(json.dumps(found.report()))
         return
     typer.echo(found.sentence)
-    typer.echo(
-        f"offset {found.offset:.6g} s +- {1.96 * found.offset_error:.2g} s (95 %), ratio of the clocks {found.ratio:.8g} "
-        f"+- {1.96 * found.ratio_error:.2g}"
-    )
+    typer.echo(f"offset of the clocks: {found.clocks.offset_in_words}")
+    typer.echo(f"ratio of the clocks: {found.clocks.ratio_in_words}")
     for note in found.notes:
         typer.echo(f"- {note}")
     typer.echo(f"written: {results.out}/{{report.html, report.json}}")
