@@ -5,6 +5,7 @@ Every text that comes from a file, a bag or a user is escaped; only blocks made 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -15,6 +16,9 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 from plotly.offline import get_plotlyjs
 
 __all__ = ["Section", "bullets", "figure", "paragraph", "preformatted", "render", "table", "tiles"]
+
+
+_BREAK = re.compile(r"([._])(?=\w)")  # where a name such as presliding.stiffness may go on in the next line
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,8 @@ def table(
         heading = escape(head[column]) if column < len(head) else ""
         return f'<td{kind(column)} data-head="{heading}">{escape(text)}</td>'
 
-    header = "".join(f"<th{kind(k)}>{escape(each)}</th>" for k, each in enumerate(head))
+    headings = (_BREAK.sub(r"\1<wbr>", escape(each)) for each in head)
+    header = "".join(f"<th{kind(k)}>{each}</th>" for k, each in enumerate(headings))
     body = "".join("<tr>" + "".join(cell(k, text) for k, text in enumerate(row)) + "</tr>" for row in rows)
     return f'<div class="scroll"><table><thead><tr>{header}</tr></thead><tbody>{body}</tbody></table></div>'
 

@@ -8,7 +8,10 @@ from ..bench.benchmark import Figure
 from ..verification.verification import Evidence, Verification
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 
-__all__ = ["goal", "quantity", "verification_page"]
+__all__ = ["TITLE", "goal", "quantity", "verification_page"]
+
+TITLE = "Verification of the physics"
+"""Title of the page, by which an earlier one is known."""
 
 _MARKS = {True: "reached", False: "MISSED", None: ""}
 
@@ -61,4 +64,4 @@ def verification_page(found: Sequence[tuple[Verification, Evidence]]) -> str:
         "The physics of fric, held against something that does not come from fric: figures of the papers, closed forms, "
         "conservation laws, integrations by another method. Every number was measured when this page was made."
     )
-    return render("Verification of the physics", lead, [summary, *(_section(*each) for each in found)])
+    return render(TITLE, lead, [summary, *(_section(*each) for each in found)])

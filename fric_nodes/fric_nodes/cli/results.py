@@ -68,6 +68,8 @@ class Results:
         Raises:
             InputError: they may not be replaced.
         """
+        if (self.out / "metadata.yaml").exists():
+            raise InputError(self.out, "is the folder of a bag", "choose another --out")
         written = record.time(self.out)
         foreign = [
             name

@@ -26,9 +26,11 @@ def verify(
 ) -> None:
     """Verify the physics; exit status 1 when a goal is missed."""
     from fric.files import write_text
-    from fric.report.verification import goal, quantity, verification_page
+    from fric.report.verification import TITLE, goal, quantity, verification_page
     from fric.verification import VERIFICATIONS
 
+    if out.exists() and (out.is_dir() or f"<title>{TITLE}</title>" not in out.read_text(encoding="utf-8", errors="replace")):
+        raise InputError(out, "is not a page of this command", "choose another --out")
     chosen = names or list(VERIFICATIONS)
     for name in chosen:
         if name not in VERIFICATIONS:
