@@ -24,7 +24,8 @@ import typer
 from fric import __version__
 from fric.bagio.write import write_record
 from fric.errors import InputError
-from fric.identification import METHODS, refuse_unused
+from fric.identification import METHODS
+from fric.identification.choice import refuse_unused
 from fric.method_settings import Options, Setting, declarations, parsed, set_values
 from fric.record import Record as Recording
 from fric_nodes.cli.groups import Group, grouped

@@ -64,7 +64,7 @@ class Agreement:
     def in_words(self) -> str:
         """How far the signals differ, as a sentence's part."""
         share = f"NOE {self.noe:.3g} %" if self.is_share else "more than the real one moves about its mean"
-        return f"{self.signal} by {self.rmse:.3g} {self.unit} RMS ({share})"
+        return f"{self.signal} within {self.rmse:.3g} {self.unit} RMS ({share})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ class Comparison:
         held = {each.signal: each for each in self.agreements}
         position = held["position"]
         parts = [each.in_words for each in (position, held["velocity"] if self.drifts else None, held.get("effort")) if each]
-        told = f"Over {self.time[-1] - self.time[0]:.3g} s simulated and real differ: {', '.join(parts)}"
+        told = f"Over {self.time[-1] - self.time[0]:.3g} s simulated and real differ by this: {', '.join(parts)}"
         if self.drifts:
             told += "; the position drifts, since a simulation without feedback integrates every error of the force twice"
         return f"{told}; the difference of {self.located_by} sits here: {self.where.regime}." if self.where else f"{told}."

@@ -33,11 +33,11 @@ class Compared:
     def summary(self) -> str:
         """By how much they differ, where, and by how much their clocks do."""
         found = self.result
-        clocks = (
-            f"offset {found.offset:.6g} s +- {1.96 * found.offset_error:.2g} s (95 %), ratio of the clocks {found.ratio:.8g} "
-            f"+- {1.96 * found.ratio_error:.2g}"
-        )
-        return "\n".join([found.sentence, clocks, *(f"- {note}" for note in found.notes)])
+        clocks = [
+            f"offset of the clocks: {found.clocks.offset_in_words}",
+            f"ratio of the clocks: {found.clocks.ratio_in_words}",
+        ]
+        return "\n".join([found.sentence, *clocks, *(f"- {note}" for note in found.notes)])
 
     def to_dict(self) -> dict[str, Any]:
         """The contents of report.json (``fric-comparison/1``)."""

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..files import write_text
-from ..identification.result import Identification, Options, Score
+from ..identification.choice import method_for
+from ..identification.result import Identification, Method, Options, Score
 from ..identification.uncertainty import Uncertainty, assess
 from ..identification.workflow import Fitted, Progress, identified, silent
+from ..method_settings import parsed, set_values
 from ..model import Model
 from ..model_file import write_model
 from ..report.kind import page_of
@@ -81,7 +83,7 @@ class Identified:
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON object that ``fric identify --json`` prints; numbers that aren't known are None."""
-        found = summary_of(self.result)
+        found = summary_of(self.result, self.fitted.options)
         if self.intervals is not None:
             found["uncertainty"] = uncertainty_json(self.intervals)
         return found
@@ -128,7 +130,8 @@ def identify(
         method: id of the method (``fric model methods``); None for the usual one of this model.
         uncertainty: intervals by ``sandwich``, ``bootstrap`` or ``profile``; empty: standard errors only.
         progress: told what is going on, a line at a time; ``print`` will do.
-        settings: fields of :class:`fric.identification.result.Options`, such as ``cutoff=50.0`` [Hz] or ``held=("mass",)``.
+        settings: of the fit, such as ``cutoff=50.0`` [Hz] or ``held=("mass",)``; see :class:`fric.method_settings.Options`. One
+            that the method doesn't use is refused.
 
     Raises:
         InputError: the recordings can't be used or don't determine the model; the message says what to do.
@@ -146,8 +149,8 @@ def identify(
     records, kept_apart = records_of(train), records_of(validate)
     if not records:
         raise InputError("identify", "no recording is given", "give one to fit")
-    options = _options(settings)
     structure = to_fit(model, records[0].joint, records[0].units)
+    options = _options(method_for(method, structure), settings)
     fitted = identified(structure, records, kept_apart, method, options, progress)
     intervals = None
     if uncertainty:
@@ -156,12 +159,12 @@ def identify(
     return Identified(fitted, intervals)
 
 
-def _options(settings: Mapping[str, Any]) -> Options:
-    known = [each.name for each in fields(Options)]
+def _options(method: Method, settings: Mapping[str, Any]) -> Options:
+    known = [each.name for each in fields(method.settings)]
     unknown = sorted(set(settings) - set(known))
     if unknown:
         raise InputError("identify", f"no setting is called {', '.join(unknown)}", f"use one of {', '.join(known)}")
-    return Options(**settings)
+    return method.settings(**{name: parsed(name, value, method.settings) for name, value in settings.items()})
 
 
 def _score(score: Score | None) -> dict[str, float | None] | None:
@@ -169,7 +172,7 @@ def _score(score: Score | None) -> dict[str, float | None] | None:
     return None if score is None else {name: value if math.isfinite(value) else None for name, value in asdict(score).items()}
 
 
-def summary_of(result: Identification) -> dict[str, Any]:
+def summary_of(result: Identification, options: Options) -> dict[str, Any]:
     """The JSON object of an identification."""
     return {
         "parameters": {
@@ -182,6 +185,7 @@ def summary_of(result: Identification) -> dict[str, Any]:
             for p in result.model.parameters()
         },
         "method": result.method,
+        "settings": set_values(options),
         "train": _score(result.train),
         "validation": _score(result.validation),
         "correlation": {

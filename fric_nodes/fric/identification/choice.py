@@ -1,13 +1,14 @@
-"""By which method a model is fitted: the one that was named, or the usual one for its structure."""
+"""By which method a model is fitted: the one that was named, or the usual one for its structure; whether it uses what is set."""
 
 from __future__ import annotations
 
 from ..errors import InputError
+from ..method_settings import Options, declarations, set_values
 from ..model import Model
 from . import METHODS
 from .result import Method
 
-__all__ = ["method_for"]
+__all__ = ["method_for", "refuse_unused"]
 
 
 def method_for(name: str | None, structure: Model | None = None) -> Method:
@@ -26,3 +27,16 @@ def method_for(name: str | None, structure: Model | None = None) -> Method:
     if name not in METHODS:
         raise InputError("--method", f"'{name}' is not known", f"use one of {', '.join(METHODS)}")
     return METHODS[name]
+
+
+def refuse_unused(method: Method, options: Options) -> None:
+    """Refuse a setting that was given and that ``method`` does not use.
+
+    Raises:
+        InputError: it names the option, and the methods that use it.
+    """
+    for name in set_values(options):
+        if name not in method.honoured:
+            users = ", ".join(each.id for each in METHODS.values() if name in each.honoured)
+            option = declarations(type(options))[name][1].option
+            raise InputError(option, f"is not used by the method {method.id}", f"leave it out, or use one of {users}")

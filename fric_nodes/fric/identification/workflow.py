@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..instrument import inspect
 from ..model import Model
 from ..record import Record
-from .choice import method_for
+from .choice import method_for, refuse_unused
 from .equations import nominal_conditions
 from .force_needed import require_force
 from .foreseen import Foreseen
@@ -69,6 +69,7 @@ def identified(
     """
     options = Options() if options is None else options
     chosen = method_for(method, structure)
+    refuse_unused(chosen, options)
     # What a load or a temperature is relative to belongs to the model: a recording under another load has another mean.
     structure = replace(structure, nominal=nominal_conditions(train) | dict(structure.nominal))
     records, kept_apart = (
@@ -76,7 +77,7 @@ def identified(
     )
     if chosen.needs_force:
         require_force(records, structure, options.held)
-    progress("looking for faults of the recordings")
+    progress("checking the recordings for faults of their instruments")
     checks = inspect(records)
     for finding in checks:
         if finding.verdict in ("warning", "fault"):
@@ -101,7 +102,7 @@ def _foreseen(
     """What the recordings can tell, said before the fit; None where the method sees something else, or nothing can be said."""
     if not method.predicts:
         return None
-    progress("asking what the recordings can tell")
+    progress("checking which parameters the recordings determine")
     try:
         found = foresee(structure, records, options, method.predicts, experiments)
     except InputError:

@@ -14,18 +14,14 @@ from fric.method_settings import Options
 from .groups import Group, grouped
 from .identify_design import Design, design_alone, designed, limits_of
 from .identify_joints import ALL, identify_each
-from .identify_method import method_of
-from .identify_shown import print_intervals, print_result, summary_of, uncertainty_json
+from .identify_shown import print_intervals, print_result
 from .options import Reading, progress, read_all
 from .results import Record as ResultRecord
 from .results import Results, ResultsGroup
 
 if TYPE_CHECKING:
-    from fric.identification.foreseen import Foreseen
-    from fric.identification.result import Identification, Method
-    from fric.instrument import Finding
-    from fric.model import Model
-    from fric.record import Record
+    from fric.facade.identifying import Identified
+    from fric.identification.result import Method
 
 __all__ = ["register"]
 
@@ -120,7 +116,9 @@ class _Asked:
 
 
 def _identify(asked: _Asked) -> None:
-    limits, chosen = limits_of(asked.design), method_of(asked.method)
+    from fric.identification.choice import method_for
+
+    limits, chosen = limits_of(asked.design), method_for(asked.method)
     if not asked.train:
         options = _options_for(chosen, asked)
         design_alone(asked.model, asked.design, limits, chosen, options, asked.results)
@@ -138,44 +136,56 @@ def _identify(asked: _Asked) -> None:
         )
         return
     asked = replace(asked, results=asked.results.claimed(_RECORD, _FILES))
-    progress(f"reading {len(asked.train) + len(asked.validate)} recording(s)")
-    records, validation = read_all(list(asked.train), asked.reading), read_all(list(asked.validate), asked.reading)
-    structure, records, validation = _structure(asked, records, validation)
-    chosen = method_of(asked.method, structure)
-    options = _options_for(chosen, asked)
-    if chosen.needs_force:
-        from fric.identification.force_needed import require_force
-
-        require_force(records, structure, options.held)
-    checks = _inspect(records)
-    fitted = _fit(chosen, structure, records, validation, options, experiments=not asked.design.wanted)
-    result = replace(fitted, checks=checks)
-    summary = summary_of(result, options)
-    intervals = _intervals(asked, result, records, options, summary)
-    _write(asked.results, result, records, validation, options, summary)
-    as_json = asked.results.as_json
+    found, chosen = _found(asked)
+    fitted, as_json = found.fitted, asked.results.as_json
+    summary = found.to_dict()
+    _write(asked.results, found, summary)
     if not as_json:
-        print_result(result, asked.results.out)
-        if intervals is not None:
-            print_intervals(intervals, structure)
+        print_result(found.result, asked.results.out)
+        if found.intervals is not None:
+            print_intervals(found.intervals, found.model)
     if limits is not None:
-        summary["design"] = designed(result.model, result, records, asked.design, limits, chosen, options, asked.results)
+        summary["design"] = designed(
+            found.model, found.result, list(fitted.train), asked.design, limits, chosen, fitted.options, asked.results
+        )
     if as_json:
         typer.echo(json.dumps(summary))
 
 
+def _found(asked: _Asked) -> tuple[Identified, Method]:
+    """The identification, and the method by which it was made."""
+    from fric.facade.identifying import Identified
+    from fric.facade.structure import to_fit
+    from fric.identification.choice import method_for
+    from fric.identification.uncertainty import assess
+    from fric.identification.workflow import identified
+
+    progress(f"reading {len(asked.train) + len(asked.validate)} recording(s)")
+    records, validation = read_all(list(asked.train), asked.reading), read_all(list(asked.validate), asked.reading)
+    structure = to_fit(asked.terms if asked.model is None else asked.model, records[0].joint, records[0].units)
+    chosen = method_for(asked.method, structure)
+    options = _options_for(chosen, asked)
+    experiments = not asked.design.wanted
+    fitted = identified(structure, records, validation, chosen.id, options, progress, experiments=experiments)
+    if not asked.uncertainty:
+        return Identified(fitted), chosen
+    progress(f"computing intervals by {asked.uncertainty}")
+    return Identified(fitted, assess(fitted.result, list(fitted.train), options, asked.uncertainty)), chosen
+
+
 def _options_for(method: Method, asked: _Asked) -> Options:
     """The settings of the fit, all of which ``method`` uses."""
-    from fric.identification import refuse_unused
+    from fric.identification.choice import refuse_unused
 
-    refuse_unused(method, asked.options)
     own = {}
     for text in asked.own:
         name, found, value = text.partition("=")
         if not found:
             raise InputError("--set", f"is '{text}'", "give NAME=VALUE")
         own[name] = value
-    return method.options(asked.options, own)
+    options = method.options(asked.options, own)
+    refuse_unused(method, options)
+    return options
 
 
 def _refuse_overlap(train: tuple[Path, ...], validation: tuple[Path, ...]) -> None:
@@ -184,102 +194,14 @@ def _refuse_overlap(train: tuple[Path, ...], validation: tuple[Path, ...]) -> No
         raise InputError(same.pop(), "is both fitted and validated on", "keep a recording apart for --validate")
 
 
-def _structure(asked: _Asked, records: list[Record], validation: list[Record]) -> tuple[Model, list[Record], list[Record]]:
-    """The model to fit, from a file or from a list of effects; and the recordings with the conditions at which it holds."""
-    from fric.identification.equations import nominal_conditions
-    from fric.identification.start import start_model
-    from fric.model_file import read_model
-
-    record = records[0]
-    if asked.model is not None:
-        structure = replace(read_model(asked.model), joint=record.joint, standard_errors={}, provenance={})
-    else:
-        names = [name.strip() for name in asked.terms.split(",") if name.strip()]
-        structure = start_model(names, record.joint, record.units)
-    # What a load or a temperature is relative to belongs to the model: a recording under another load has another mean.
-    structure = replace(structure, nominal=nominal_conditions(records) | dict(structure.nominal))
-    records, validation = ([replace(each, nominal=structure.nominal) for each in held] for held in (records, validation))
-    return structure, records, validation
-
-
-def _inspect(records: list[Record]) -> tuple[Finding, ...]:
-    """What is wrong with the recordings themselves, said before anything is fitted."""
-    from fric.instrument import inspect
-
-    progress("checking the recordings for faults of their instruments")
-    findings = inspect(records)
-    for finding in findings:
-        if finding.verdict in ("warning", "fault"):
-            progress(f"{finding.verdict}: {finding.detail}{'; ' + finding.remedy if finding.remedy else ''}")
-    return findings
-
-
-def _foresee(structure: Model, records: list[Record], options: Options, method: Method, experiments: bool) -> Foreseen | None:
-    """Which parameters the recordings determine, said before the fit; None where the method predicts no samples."""
-    from fric.identification.identifiability import foresee
-
-    if not method.predicts:
-        return None
-    progress("checking which parameters the recordings determine")
-    try:
-        found = foresee(structure, records, options, method.predicts, experiments)
-    except InputError:
-        return None  # the fit will say it
-    for line in found.warnings:
-        progress(f"before the fit: {line}")
-    return found
-
-
-def _fit(
-    method: Method,
-    structure: Model,
-    records: list[Record],
-    validation: list[Record],
-    options: Options,
-    experiments: bool,
-) -> Identification:
-    from fric.identification.misfit import validated
-
-    foreseen = _foresee(structure, records, options, method, experiments)
-    progress(f"fitting {', '.join(structure.names)} by {method.id}")
-    result = replace(method.fit(structure, records, options), foreseen=foreseen)
-    provenance = {
-        "recordings": ", ".join(record.source for record in records),
-        "method": method.id,
-        "equations": str(result.train.n_samples),
-    }
-    result = replace(result, model=replace(result.model, provenance=provenance))
-    return validated(result, method, records, validation, options) if validation else result
-
-
-def _intervals(asked: _Asked, result: Identification, records: list[Record], options: Options, summary: dict[str, Any]) -> Any:
-    """Intervals of the parameters, which ``summary`` gets too; None when none are asked for."""
-    if not asked.uncertainty:
-        return None
-    from fric.identification.uncertainty import assess
-
-    progress(f"computing intervals by {asked.uncertainty}")
-    found = assess(result, records, options, asked.uncertainty)
-    summary["uncertainty"] = uncertainty_json(found)
-    return found
-
-
-def _write(
-    results: Results,
-    result: Identification,
-    records: list[Record],
-    validation: list[Record],
-    options: Options,
-    summary: dict[str, Any],
-) -> None:
+def _write(results: Results, found: Identified, summary: dict[str, Any]) -> None:
     """Every result, or none: all are made before the first is written."""
     from fric.model_file import model_to_text
-    from fric.report.kind import page_of
 
     texts = {
-        "model.yaml": model_to_text(result.model),
-        **result.attachments,
-        "report.html": page_of(result, records, validation, options),
+        "model.yaml": model_to_text(found.model),
+        **found.result.attachments,
+        "report.html": found.report(),
         _RECORD.name: json.dumps(summary, indent=2) + "\n",
     }
     results.write(_RECORD, texts)

@@ -1,79 +1,20 @@
-"""What ``fric identify`` says: one JSON object for programs, a table and the remarks for people."""
+"""What ``fric identify`` says: tables and the remarks."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from fric.method_settings import set_values
+from typing import TYPE_CHECKING
 
 from .printed import console, plain_table
 
 if TYPE_CHECKING:
     from fric.identification.design import Proposal
-    from fric.identification.result import Identification, Options, Score
+    from fric.identification.result import Identification
     from fric.identification.uncertainty import Uncertainty
     from fric.model import Model
 
-__all__ = ["print_design", "print_intervals", "print_result", "summary_of", "uncertainty_json"]
-
-
-def _score_json(score: Score | None) -> dict[str, float | None] | None:
-    """A score; what a method has no figure for is null."""
-    return None if score is None else {name: value if math.isfinite(value) else None for name, value in asdict(score).items()}
-
-
-def summary_of(result: Identification, options: Options) -> dict[str, Any]:
-    """The JSON object of the contract."""
-    return {
-        "parameters": {
-            p.name: {
-                "value": p.value,
-                "std": result.model.standard_errors.get(p.name) if p.name in result.fitted else None,
-                "unit": p.declaration.unit(result.model.units),
-                "fitted": p.name in result.fitted,
-            }
-            for p in result.model.parameters()
-        },
-        "method": result.method,
-        "settings": set_values(options),
-        "train": _score_json(result.train),
-        "validation": _score_json(result.validation),
-        "correlation": {
-            "parameters": list(result.fitted),
-            "matrix": [[None if math.isnan(value) else value for value in row] for row in result.correlation.tolist()],
-        },
-        "status": result.status,
-        "warnings": list(result.warnings),
-        "notes": list(result.notes),
-        "checks": [finding.as_json() for finding in result.checks],
-        "identifiability": None if result.foreseen is None else result.foreseen.summary(),
-    }
-
-
-def uncertainty_json(found: Uncertainty) -> dict[str, Any]:
-    """Intervals by parameter; null where there is no limit, or no second recording."""
-
-    def number(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
-    return {
-        "kind": found.kind,
-        "probability": found.probability,
-        "parameters": {
-            name: {
-                "std": number(float(found.standard_errors[k])),
-                "lower": number(float(found.lower[k])),
-                "upper": number(float(found.upper[k])),
-                "std_over_restarts": number(float(found.restarts[k])),
-                "std_over_recordings": number(float(found.recordings[k])),
-            }
-            for k, name in enumerate(found.names)
-        },
-        "notes": list(found.notes),
-    }
+__all__ = ["print_design", "print_intervals", "print_result"]
 
 
 def print_intervals(found: Uncertainty, model: Model) -> None:
