@@ -6,7 +6,7 @@ A figure is stated only where the recordings determine it. The offset is, when i
 the velocity changes by its own size (RMS of the velocity over RMS of the acceleration, a physical scale): a larger shift is
 another motion, not a late one. The ratio of the clocks is, when its limits lie within the range in which it is searched. The
 normalised error of a signal is a share only below 100 %, where a constant would do as well; beyond, the difference is given in
-the signal's unit. A position that differs that much while the velocity agrees drifts.
+the signal's unit. A position that differs that much while the velocity or the effort agrees drifts.
 
 Where the two differ is said by the energy of the difference of velocities, or of efforts where the motions agree and the
 efforts don't, as a diagnosis says it.
@@ -97,9 +97,9 @@ class Comparison:
 
     @property
     def drifts(self) -> bool:
-        """True where the position differs by more than its own spread while the velocity agrees."""
+        """True where the position differs by more than its own spread while the velocity or the effort agrees."""
         held = {each.signal: each for each in self.agreements}
-        return not held["position"].is_share and held["velocity"].is_share
+        return not held["position"].is_share and any(held[name].is_share for name in ("velocity", "effort") if name in held)
 
     @property
     def sentence(self) -> str:

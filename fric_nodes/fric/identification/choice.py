@@ -1,4 +1,4 @@
-"""By which method a model is fitted: the one that was named, or the usual one for its structure; whether it uses what is set."""
+"""By which method a model is fitted: the one named, or the usual one for its structure; whether it uses what is set."""
 
 from __future__ import annotations
 

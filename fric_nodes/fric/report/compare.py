@@ -36,7 +36,7 @@ def comparison_report(found: Comparison) -> str:
 def _tile(each: Agreement) -> tuple[str, str]:
     """A signal's difference as a share of its spread, or in its unit where it is no share."""
     if each.is_share:
-        return f"{each.noe:.3g} %", f"of the spread of the {each.signal} differ (normalised output error)"
+        return f"{each.noe:.3g} %", f"of the variance of the {each.signal} is the difference (normalised output error)"
     return (
         f"{significant(each.rmse, 3)} {each.unit}",
         f"RMS difference of the {each.signal}, more than it moves about its mean: no share is stated",
