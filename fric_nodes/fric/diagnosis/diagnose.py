@@ -25,13 +25,14 @@ from ..record import Array, Record
 from ..signals.resolution import noise_of
 from ..signals.stamps import evened
 from ..threads import linear_algebra_in_one
+from .additive.told import by_component
 from .blocks import one_sided
 from .candidates import FRICTION, Scales, candidates, place_of, scales_of
 from .component import Signature, agreed, signatures
 from .confidence import LITTLE_LEFT, MANY, UNEXPLAINED, confidence_of, is_doubtful, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, refit
-from .grow import Growth, grow, helped, without_nothings
+from .grow import Growth, by_parts, grow, helped, without_nothings
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
 from .locate import Where, locate, moved_back, steady
@@ -150,6 +151,8 @@ def diagnose(
     searched = list(tracks if parts is None else parts.tracks)
     growth = grow(searched, start, tell)
     if growth.beyond > 0.0 or growth.rest > _most_left(growth):
+        growth = by_parts(searched, growth, tell)
+    if growth.beyond > 0.0 or growth.rest > _most_left(growth):
         growth = helped(searched, growth, tell)
     if parts is not None:
         tell("fitting what was found to all samples")
@@ -157,6 +160,9 @@ def diagnose(
         corrected.append(note)
     tell("judging on the validation recordings")
     found = _concluded(train, validation, nominal, checks, corrected, tracks, searched, growth)
+    if any(each.effect == "unknown" for each in found.findings):
+        tell("weighing what is left by the components of the machine")
+        found = replace(found, components=by_component(searched, found.model))
     if massless and not _holds_inertia(found, nominal, train):
         raise DiagnosisError(
             train[0].source,

@@ -12,7 +12,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..model import Model
+from ..model import Model, Term
+from .additive.growing import grown_by_parts, middle_of
 from .candidates import candidates, scales_of
 from .fitting import NOTHING, State, best_track, refit
 from .laws import with_best_laws
@@ -21,7 +22,7 @@ from .screen import Screening, Tried, screen
 from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, audit, exchanged, is_nothing, merged, settled
 from .track import Track
 
-__all__ = ["Growth", "grow", "helped", "without_nothings"]
+__all__ = ["Growth", "by_parts", "grow", "helped", "without_nothings"]
 
 _TO_COMPARE = 2  # terms, after which another beginning is tried
 _OTHER_BEGINNINGS = 2
@@ -125,6 +126,35 @@ def _grown_faster(tracks: Sequence[Track], growth: Growth, tell: Callable[[str],
         more = _settled(_added([track], seen, None, tell))
         return more if more.steps and more.rest < _AGAIN and more.price < seen.price else growth
     return growth
+
+
+def by_parts(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:
+    """``growth``, or the model grown from what each component lacks, where that leaves less.
+
+    Args:
+        tracks: those that ``growth`` was grown on.
+        growth: that leaves more than an explanation does.
+        tell: told what comes.
+    """
+    tell("taking what is missing apart by the components of the machine")
+    track = middle_of(tracks)
+    begin = refit(track, growth.begin.fit.model)
+    arrivals = grown_by_parts(track, begin, tell)
+    if not arrivals:
+        return growth
+    steps = []
+    for each in arrivals:
+        name = each.after.fit.model.prefixes[_place_in(each.after, each.term)]
+        steps.append(Step(name, each.before.left, each.after.left, each.before.floor, each.before.excess, (), growth.last))
+    raw = Growth(track, begin, arrivals[-1].after, tuple(steps), growth.last, 1.0, growth.rejected, ended=True)
+    other = _settled(raw)
+    better = bool(other.steps) and other.rest < max(growth.rest, growth.beyond) and other.price < growth.price + growth.beyond
+    return replace(other, last=_screened(track, other.end)) if better else growth
+
+
+def _place_in(state: State, held: Term) -> int:
+    """Number of the last term of the model that is of the effect of ``held``."""
+    return max(k for k, each in enumerate(state.fit.model.terms) if each.effect.id == held.effect.id)
 
 
 def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:

@@ -12,6 +12,7 @@ import numpy as np
 from ..instrument import Finding as Check
 from ..model import Model
 from ..record import Array
+from .additive.told import ComponentFinding
 from .confidence import FAINT
 from .locate import Where
 
@@ -169,6 +170,8 @@ class Diagnosis:
         grown: how the model grew, for the report: the refitted nominal first, its term empty.
         only_held_back: True where the recordings learnt from lack nothing, and those held back do.
         by_means: True where means of runs at constant speeds were compared, not samples.
+        components: what the grown model still lacks, by component of the machine, in the recordings learnt from; empty where
+            nothing unknown is left.
     """
 
     mismatch: bool
@@ -189,6 +192,7 @@ class Diagnosis:
     grown: tuple[Grown, ...]
     only_held_back: bool = False
     by_means: bool = False
+    components: tuple[ComponentFinding, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -281,6 +285,7 @@ class Diagnosis:
                 "force_error_augmented": errors[1],
             },
             "unexplained": {"share": self.unexplained.share, "where": _where(self.unexplained.where)},
+            "components": [each.as_json() for each in self.components],
             "next_experiment": self.next_experiment,
             "notes": list(self.notes),
             "observer_bandwidth": None if self.by_means else self.bandwidth,

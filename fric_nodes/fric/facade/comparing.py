@@ -50,13 +50,16 @@ class Compared:
             write_text(Path(path), page)
         return page
 
+    def files(self) -> dict[str, str]:
+        """Contents of report.html and report.json, by name."""
+        return {"report.html": self.report(), "report.json": json.dumps(self.to_dict(), indent=2) + "\n"}
+
     def save(self, folder: str | Path) -> list[Path]:
-        """Write report.json and report.html, and return them."""
-        out = Path(folder)
-        page = self.report()
-        write_text(out / "report.json", json.dumps(self.to_dict(), indent=2) + "\n")
-        write_text(out / "report.html", page)
-        return [out / "report.json", out / "report.html"]
+        """Write :meth:`files` into ``folder``, and return their paths."""
+        texts = {Path(folder) / name: text for name, text in self.files().items()}
+        for path, text in texts.items():
+            write_text(path, text)
+        return list(texts)
 
 
 def compare(simulated: Source, real: Source) -> Compared:

@@ -19,7 +19,7 @@ from ..identification.force_needed import require_force
 from ..identification.screen import screened
 from ..identification.workflow import Progress, silent
 from ..model import Model
-from ..model_file import write_model
+from ..model_file import model_to_text
 from ..record import Record
 from ..report.kind import page_of
 from .reading import records_of
@@ -49,6 +49,23 @@ class Diagnosed:
     def findings(self) -> Sequence[Finding]:
         """The effects that are missing, the largest first; empty when the model describes the recordings."""
         return self.result.findings
+
+    @property
+    def components(self) -> pd.DataFrame:
+        """A table with one row per component of the machine: ``presence``, ``evidence_nats``, ``force_rms``, best ``law``."""
+        rows = [
+            {
+                "component": each.component,
+                "place": each.place,
+                "presence": each.presence,
+                "evidence_nats": each.evidence,
+                "force_rms": each.force,
+                "law": each.laws[0].effect if each.laws else "",
+                "explained": each.laws[0].explained if each.laws else float("nan"),
+            }
+            for each in self.result.components
+        ]
+        return pd.DataFrame(rows)
 
     @property
     def model(self) -> Model:
@@ -81,6 +98,7 @@ class Diagnosed:
             found.sentence,
             found.force_errors_in_words,
             *(f"- {each.evidence}; {each.component}; {each.where.regime}" for each in found.findings),
+            *(f"- {each.sentence(found.given.units.force)}" for each in found.components if each.is_there),
             *(f"- instrument: {check.detail}; {check.remedy}" for check in faults),
             *(f"- {note}" for note in found.notes),
             f"next: {found.next_experiment}",
@@ -98,23 +116,21 @@ class Diagnosed:
             write_text(Path(path), page)
         return page
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write report.json, prediction.csv, model.yaml and report.html; all are made before the first.
-
-        Returns:
-            The files written.
-        """
-        out = Path(folder)
-        page = self.report()
-        texts = {
-            "report.json": json.dumps(self.to_dict(), indent=2) + "\n",
+    def files(self) -> dict[str, str]:
+        """Contents of report.html, model.yaml, prediction.csv and report.json, by name."""
+        return {
+            "report.html": self.report(),
+            "model.yaml": model_to_text(self.model),
             "prediction.csv": self.prediction.to_csv(index=False, float_format="%.9g"),
+            "report.json": json.dumps(self.to_dict(), indent=2) + "\n",
         }
-        for name, text in texts.items():
-            write_text(out / name, text)
-        write_model(self.model, out / "model.yaml")
-        write_text(out / "report.html", page)
-        return [out / name for name in (*texts, "model.yaml", "report.html")]
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write :meth:`files` into ``folder``, all made before the first is written, and return their paths."""
+        texts = {Path(folder) / name: text for name, text in self.files().items()}
+        for path, text in texts.items():
+            write_text(path, text)
+        return list(texts)
 
 
 def diagnose(

@@ -61,6 +61,8 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
         sections.append(_whole(found))
         sections.append(_regimes(found, validation[0]))
     sections += [_finding_section(each, k) for k, each in enumerate(found.findings)]
+    if found.components:
+        sections.append(_components_section(found))
     sections += [_growth_section(found), _candidates_section(found), _parameters_section(found), _rest_section(found)]
     if found.checks:
         sections.append(checks_section(found.checks, [record.source for record in train]))
@@ -215,6 +217,35 @@ def _finding_section(each: Finding, number: int) -> Section:
         ]
         blocks.append(table(("parameter", "value", "standard error", "unit"), values, text_columns=(0, 3)))
     return Section(f"{number + 1}. {each.title[0].upper()}{each.title[1:]}", tuple(blocks))
+
+
+def _components_section(found: Diagnosis) -> Section:
+    """Where something is still missing, each component weighed beside all others."""
+    unit = found.given.units.force
+    rows = []
+    for each in found.components:
+        best = each.laws[0] if each.laws and each.is_there else None
+        rows.append(
+            (
+                each.title,
+                each.place,
+                f"{100 * each.presence:.3g} %",
+                f"{each.evidence:.1f}",
+                f"{significant(each.force, 2)} {unit}" if each.is_there else "",
+                "" if best is None else best.title,
+                "" if best is None else f"{100 * best.explained:.0f} %",
+            )
+        )
+    head = ("component", "part of the machine", "something is missing", "evidence [nats]", "force, rms", "best law", "explains")
+    note = (
+        "What the grown model still lacks in the recordings learnt from, as a sum of one flexible function per component. "
+        "The evidence compares the sum with and without a component, all others fitted anew. The last column is the share of a "
+        "component's evidence that its best law reaches: where it is small, no law of the vocabulary describes what is missing."
+    )
+    return Section(
+        "What is still missing, by component",
+        (table(head, rows, text_columns=(0, 1, 5), wrap=(0, 5)), paragraph(note, "note")),
+    )
 
 
 def _growth_section(found: Diagnosis) -> Section:

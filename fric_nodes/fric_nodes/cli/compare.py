@@ -34,21 +34,15 @@ def compare(
     results: ResultsGroup = Results(Path("comparison")),
 ) -> None:
     """Align two recordings in time and say by how much and where they differ; writes report.html and report.json."""
-    from fric.diagnosis.compare import compare as align
-    from fric.report.compare import comparison_report
+    import fric
 
     results = results.claimed(_RECORD, ("report.html",))
     progress("reading 2 recordings")
-    first, second = read_all([simulated, real], reading)
-    found = align(first, second)
-    report = json.dumps(found.report(), indent=2) + "\n"
-    results.write(_RECORD, {"report.html": comparison_report(found), _RECORD.name: report})
+    first, second = read_all([simulated, real], reading, as_recorded=True)
+    found = fric.compare(first, second)
+    results.write(_RECORD, found.files())
     if results.as_json:
-        typer.echo(json.dumps(found.report()))
+        typer.echo(json.dumps(found.to_dict()))
         return
-    typer.echo(found.sentence)
-    typer.echo(f"offset of the clocks: {found.clocks.offset_in_words}")
-    typer.echo(f"ratio of the clocks: {found.clocks.ratio_in_words}")
-    for note in found.notes:
-        typer.echo(f"- {note}")
-    typer.echo(f"written: {results.out}/{{report.html, report.json}}")
+    typer.echo(found.summary())
+    typer.echo(f"written: {results.out}/{{{', '.join(found.files())}}}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from fric.errors import InputError
@@ -15,11 +15,7 @@ from .printed import console
 from .results import Record as ResultRecord
 from .results import Results, ResultsGroup
 
-if TYPE_CHECKING:
-    from fric.diagnosis import Diagnosis
-    from fric.record import Record
-
-__all__ = ["register", "write_diagnosis"]
+__all__ = ["register"]
 
 _RECORD = ResultRecord("report.json", form="fric-report/1")
 _FILES = ("report.html", "model.yaml", "prediction.csv")
@@ -53,9 +49,7 @@ def diagnose(
     results: ResultsGroup = Results(Path("diagnosis")),
 ) -> None:
     """Find which physical effects a model leaves out, and write report.html, report.json, model.yaml and prediction.csv."""
-    from fric.diagnosis import diagnose as find
-    from fric.diagnosis.blocks import in_blocks
-    from fric.identification.force_needed import require_force
+    import fric
     from fric.model_file import read_model
 
     given = validate or []
@@ -67,64 +61,13 @@ def diagnose(
     nominal = read_model(model)
     results = results.claimed(_RECORD, _FILES)
     progress(f"reading {len(train) + len(given)} recording(s)")
-    records = read_all(train, reading)
-    require_force(records)
-    records, kept_apart = (records, read_all(given, reading)) if blocks is None else in_blocks(records, blocks)
-    found = find(records, kept_apart, nominal, progress)
-    write_diagnosis(results, found, records, kept_apart)
+    records, kept_apart = (read_all(paths, reading, as_recorded=True) for paths in (train, given))
+    found = fric.diagnose(records, nominal, validate=kept_apart, blocks=blocks, progress=progress)
+    results.write(_RECORD, found.files())
     if results.as_json:
-        typer.echo(json.dumps(found.report()))
-    else:
-        _print(found, results.out)
-
-
-def write_diagnosis(results: Results, found: Diagnosis, train: list[Record], validation: list[Record]) -> None:
-    """Every result, or none: all are made before the first is written."""
-    from fric.model_file import model_to_text
-    from fric.report.diagnosis import diagnosis_report
-
-    texts = {
-        "report.html": diagnosis_report(found, train, validation),
-        "model.yaml": model_to_text(found.model),
-        "prediction.csv": _csv(found),
-        _RECORD.name: json.dumps(found.report(), indent=2) + "\n",
-    }
-    results.write(_RECORD, texts)
-
-
-def _csv(found: Diagnosis) -> str:
-    """The forces of the validation recordings, one below the other, with a column for the recording where there are several."""
-    import pandas as pd
-
-    parts = []
-    for p in found.prediction:
-        columns = {
-            "time": p.time,
-            "force_measured": p.force_measured,
-            "force_nominal": p.force_nominal,
-            "force_refit": p.force_refit,
-            "force_augmented": p.force_augmented,
-        }
-        part = pd.DataFrame(columns)
-        if len(found.prediction) > 1:
-            part["recording"] = p.source
-        parts.append(part)
-    text: str = pd.concat(parts).to_csv(index=False, float_format="%.9g")
-    return text
-
-
-def _print(found: Diagnosis, out: Path) -> None:
+        typer.echo(json.dumps(found.to_dict()))
+        return
     shown = console()
-    shown.print(found.sentence)
-    if found.force_errors_in_words:
-        shown.print(found.force_errors_in_words)
-    for each in found.findings:
-        shown.print(f"- {each.evidence}; {each.component}; {each.where.regime}")
-    faults = [check for check in found.checks if check.verdict == "fault"]
-    for check in faults:
-        shown.print(f"- instrument: {check.detail}; {check.remedy}")
-    for note in found.notes:
-        shown.print(f"- {note}")
-    shown.print(f"next: {found.next_experiment}")
-    names = "report.html, report.json, model.yaml, prediction.csv"
-    shown.print(f"written: {out}/{{{names}}}")
+    for line in found.summary().splitlines():
+        shown.print(line)
+    shown.print(f"written: {results.out}/{{{', '.join(found.files())}}}")

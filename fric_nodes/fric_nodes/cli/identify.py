@@ -161,7 +161,7 @@ def _found(asked: _Asked) -> tuple[Identified, Method]:
     from fric.identification.workflow import identified
 
     progress(f"reading {len(asked.train) + len(asked.validate)} recording(s)")
-    records, validation = read_all(list(asked.train), asked.reading), read_all(list(asked.validate), asked.reading)
+    records, validation = (read_all(list(each), asked.reading, as_recorded=True) for each in (asked.train, asked.validate))
     structure = to_fit(asked.terms if asked.model is None else asked.model, records[0].joint, records[0].units)
     chosen = method_for(asked.method, structure)
     options = _options_for(chosen, asked)

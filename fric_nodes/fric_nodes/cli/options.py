@@ -83,8 +83,8 @@ ReadingGroup = Annotated[Reading, Group("Reading the recordings")]
 """How recordings are read, as a parameter of a command."""
 
 
-def read_all(paths: list[Path], reading: Reading) -> list[Record]:
-    """The recordings at ``paths``, with end stops and saturation left out.
+def read_all(paths: list[Path], reading: Reading, as_recorded: bool = False) -> list[Record]:
+    """The recordings at ``paths``, with end stops and saturation left out unless they are wanted ``as_recorded``.
 
     Raises:
         InputError: one of them can't be used.
@@ -95,20 +95,19 @@ def read_all(paths: list[Path], reading: Reading) -> list[Record]:
     if reading.time not in {"stamp", "log"}:
         raise InputError("--time", f"'{reading.time}' is not known", "use stamp or log")
     topics = reading.topic_names()
-    return [
-        screened(
-            read_record(
-                path,
-                joint=reading.joint,
-                topics=topics,
-                time="log" if reading.time == "log" else "stamp",
-                repair=reading.repair,
-                start=reading.start,
-                end=reading.end,
-            )
+    records = [
+        read_record(
+            path,
+            joint=reading.joint,
+            topics=topics,
+            time="log" if reading.time == "log" else "stamp",
+            repair=reading.repair,
+            start=reading.start,
+            end=reading.end,
         )
         for path in paths
     ]
+    return records if as_recorded else [screened(record) for record in records]
 
 
 def progress(text: str) -> None:
