@@ -69,6 +69,7 @@ def test_what_other_effects_stand_in_for_is_named_alone(effect: str, seed: int) 
     assert v.noe_augmented - v.noise_floor < 0.1 * (v.noe_refit - v.noise_floor)
 
 
+@pytest.mark.long
 def test_where_the_first_effects_leave_something_others_are_begun_with() -> None:
     # Saturation and a hysteresis explain nine tenths, and so does saturation alone: the third beginning is the right one.
     case = draw(1423582479, "pair", ("quadratic_drag", "asymmetry"), "form")
@@ -112,6 +113,7 @@ def test_what_a_usual_law_leaves_is_no_other_effect(effect: str, law: str, seed:
     assert found.findings[0].parameters[name].value == pytest.approx(true, rel=0.03)
 
 
+@pytest.mark.long
 def test_where_twins_stick_and_slip_far_apart_what_is_left_says_which_rival_is_right() -> None:
     # Twins leave five times as much as the hysteresis does, the Stribeck effect a third of that.
     case = draw(326562437, "pair", ("stribeck", "load_dependence"))
@@ -154,6 +156,7 @@ def test_one_simple_cause_is_believed_rather_than_effects_that_share_its_work(se
     assert found.findings[0].component == "load"
 
 
+@pytest.mark.long
 def test_what_explains_all_on_an_axis_of_another_mass_is_no_explanation() -> None:
     # Friction that falls while slowing down explains it to a thousandth, on an axis of a quarter of the mass.
     case = draw(2114983913, "pair", ("viscous", "saturation"), "form")
@@ -210,6 +213,7 @@ def test_beside_something_faint_and_unknown_nothing_is_told_as_likely() -> None:
     assert all(each.confidence < 0.5 for each in found.findings)
 
 
+@pytest.mark.long
 def test_what_only_the_recording_held_back_shows_is_unknown_and_located() -> None:
     # A cable that pulls from a place on to which the other recordings never went.
     case = draw(509008653, "unknown", "cable_chain")
@@ -299,6 +303,7 @@ def test_rest_and_missing_force_are_refused() -> None:
         diagnose([silent], case.validation, case.nominal)
 
 
+@pytest.mark.long
 def test_a_model_of_another_plant_is_refused_unless_it_holds_the_right_one() -> None:
     case = draw(3, "nothing")
     terms = [term("coulomb", force=1.0), term("viscous", coefficient=1.0)]

@@ -48,6 +48,7 @@ def test_a_term_that_comes_out_at_nothing_is_credited_with_nothing() -> None:
     assert float(freely @ freely) < 0.5 * float(fit.residual @ fit.residual)
 
 
+@pytest.mark.long
 def test_what_helps_is_told_beside_something_unknown() -> None:
     """A restless force of 3 N holds many times a ripple's energy: the ripple takes too little to explain it, and helps."""
     truth = TRUTH.with_terms([*TRUTH.terms, term("ripple", cosine=0.7, sine=-0.55, period=0.031)])

@@ -48,6 +48,7 @@ def entry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "made_up_diagnosis:diagnose"
 
 
+@pytest.mark.long
 def test_an_examination_from_seed_to_page(tmp_path: Path, entry: str) -> None:
     out = tmp_path / "proof"
     said: list[str] = []

@@ -83,6 +83,7 @@ def _jittering(record: Record, part: float, seed: int) -> Record:
     return replace(record, time=time - time[0])
 
 
+@pytest.mark.long
 def test_stamps_that_jitter_where_the_motion_does_not_are_taken_as_even() -> None:
     case = draw(4, "nothing")
     train, validation = ([_jittering(each, 0.2, 3) for each in held] for held in (case.train, case.validation))

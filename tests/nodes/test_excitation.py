@@ -72,6 +72,7 @@ def _sample(message: Any) -> int:
     return round((message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec) / H)
 
 
+@pytest.mark.long
 def test_in_lock_step_the_answers_are_those_of_the_core(graph: Graph) -> None:
     axis = SimulatedAxis(MODEL, resolution=1e-7)
     axis.advance(0.0, 1e-12)

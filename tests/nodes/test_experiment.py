@@ -95,6 +95,7 @@ class Hearer:
         graph.spin(self.node, kind=LeanExecutor)
 
 
+@pytest.mark.long
 def test_processes_in_lock_step_find_the_axis(graph: Graph) -> None:
     out = graph.folder / "found"
     graph.start_node("plant", **_plant(graph.folder))

@@ -111,6 +111,7 @@ def test_from_a_recording_as_from_the_machine(graph: Any, tmp_path: Path) -> Non
     assert set(model.standard_errors) == set(TRUTH)
 
 
+@pytest.mark.long
 def test_the_command_serves_where_joint_states_have_no_effort(graph: Any, tmp_path: Path) -> None:
     record = recorded()
     bag = tmp_path / "bag"

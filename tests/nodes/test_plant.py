@@ -134,6 +134,7 @@ def test_every_model_runs_in_lock_step_as_the_core_alone(graph: Graph, file: str
     assert len(list(plant.publishers)) == len(list(graph.owns(ExcitationNode(context=context)).publishers)) + len(names)
 
 
+@pytest.mark.long
 def test_two_runs_with_signals_give_the_same_bag(graph: Graph) -> None:
     names = [s.name for s in read_model(CONFIG / WITH_SIGNALS).plant.signals]
     assert len(names) > 1

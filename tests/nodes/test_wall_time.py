@@ -110,6 +110,7 @@ def test_loop_follows_the_reference_in_one_process(graph: Graph, kind: type[Exec
     graph.until(lambda: listener.follows(5e-4), "the axis follows a reference that moves")
 
 
+@pytest.mark.long
 def test_processes_come_and_go(graph: Graph) -> None:
     listener = Listener(graph)
     parameters = {
