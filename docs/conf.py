@@ -29,19 +29,33 @@ autodoc_default_options = {"members": True, "show-inheritance": False}
 napoleon_use_ivar = True
 napoleon_use_rtype = False
 
-_EQUATION_SIGNS = re.compile(r"(?<![\\`])([*|])")
+# Names in the fields of a docstring ("position", "Finding") may have several targets; each is still a link to one of them.
+suppress_warnings = ["ref.python"]
+
+_MARKUP = re.compile(r"(``.*?``|\*\*[^*]+\*\*|\*[^*\s][^*]*\*(?=\W|$)|:[\w:]+:`[^`]*`)")
 
 
-def _escape(app: object, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Equations in docstrings are plain text: their bars and stars are signs, not markup."""
-    for number, line in enumerate(lines):
-        parts = re.split(r"(``.*?``|\*\*[^*]+\*\*|\*[^*\s][^*]*\*(?=\W|$)|:\w+:`[^`]*`)", line)
-        lines[number] = "".join(
-            part if index % 2 or line.startswith("    ") else _EQUATION_SIGNS.sub(r"\\\1", part)
-            for index, part in enumerate(parts)
-        )
+def _as_markup(app: object, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Equations in docstrings are plain text: indented ones become literal blocks, signs within a line are no markup."""
+    found: list[str] = []
+    literal = False
+    for line in lines:
+        indented = line.startswith("    ")
+        if what == "module" and indented and not literal and found and not found[-1].strip():
+            last = next((before for before in reversed(found) if before.strip()), "")
+            literal = not last.startswith((" ", "-", "*", ".. ", ":")) or last.endswith("::")
+            if literal and not last.endswith("::"):
+                found += ["::", ""]
+        elif line.strip() and not indented:
+            literal = False
+        if not indented:
+            parts = _MARKUP.split(line)
+            parts[::2] = [re.sub(r"(?<![\\`])([*|])", r"\\\1", part) for part in parts[::2]]
+            line = "".join(parts)  # noqa: PLW2901
+        found.append(line)
+    lines[:] = found
 
 
 def setup(app: object) -> None:
-    """Connect the escaping of equations."""
-    app.connect("autodoc-process-docstring", _escape)  # type: ignore[attr-defined]
+    """Connect the treatment of equations."""
+    app.connect("autodoc-process-docstring", _as_markup)  # type: ignore[attr-defined]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .conftest import Graph
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+PAGES = (ROOT / "README.md", *sorted(page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts))
 _RUNNING = 2.0  # [s] that a node goes on once it is in the graph
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.M | re.S)
 _PLANT = "fric node plant --ros-args"
@@ -122,6 +122,11 @@ def _followed(folder: Path) -> None:
     write_record(replace(record, reference=record.position), folder / "bags" / "my_run")
 
 
+def _recorded(folder: Path) -> None:
+    """``bags/my_axis``, as the how-to records it."""
+    shutil.copytree(folder / "bags" / "slide", folder / "bags" / "my_axis")
+
+
 def _published(*names: str, under: str = "") -> Setup:
     """Files of published recordings, from the folder FRIC_DATA; ``under``: part of the path to them."""
 
@@ -177,6 +182,11 @@ def _in_ci(*texts: str) -> Callable[[], bool]:
     return lambda: all(text in (ROOT / ".ci" / "run").read_text(encoding="utf-8") for text in texts)
 
 
+def _by_tutorial() -> bool:
+    """True when the test of the examples walks through the tutorial, which needs its commands in their order."""
+    return "tutorial.md" in (ROOT / "tests" / "docs" / "test_examples.py").read_text(encoding="utf-8")
+
+
 def _long(limit: float = 3600.0, **rest: object) -> Case:
     return Case(long=True, limit=limit, **rest)  # type: ignore[arg-type]
 
@@ -201,11 +211,27 @@ _TIAGO = "fric import tiago_effort.csv --map config/published/torso.yaml --repai
 
 KNOWN: dict[str, Case] = {
     "python3 -m venv env && . env/bin/activate && pip install . && fric demo --out demo": Case(
-        checked=_in_ci('-m venv "$work/env"', "pip install --quiet '.[test]'")
+        checked=_in_ci('-m venv "$work/env"', "pip install --quiet '.[test,docs]'")
     ),
     "pip install '.[test]' && python -m pytest -n auto --dist worksteal": Case(
-        checked=_in_ci("pip install --quiet '.[test]'", "python -m pytest -n auto --dist worksteal")
+        checked=_in_ci("pip install --quiet '.[test,docs]'", "python -m pytest -n auto --dist worksteal")
     ),
+    "sphinx-build -W --keep-going docs docs/_build": Case(checked=_in_ci("sphinx-build -q -W --keep-going docs")),
+    "fric record bags/my_axis --topic /joint_states --topic /effort_controller/commands": Case(node="recorder"),
+    "fric doctor bags/my_axis": Case((_recorded,)),
+    **{
+        command: Case(checked=_by_tutorial)
+        for command in (
+            "fric import axis.csv --map axis_map.yaml --out bags/axis",
+            "fric import check.csv --map axis_map.yaml --out bags/check",
+            "fric doctor bags/axis",
+            "fric identify bags/axis --validate bags/check --terms coulomb,viscous,bias --out found",
+            "fric diagnose bags/axis --validate bags/check --model found/model.yaml --out diagnosis",
+            "fric identify bags/axis --validate bags/check --terms coulomb,stribeck,viscous,bias --out richer",
+            "fric simulate richer/model.yaml --closed-loop pid.yaml --reference bags/check --out bags/pid_alone",
+            "fric simulate richer/model.yaml --closed-loop compensated.yaml --reference bags/check --out bags/compensated",
+        )
+    },
     "colcon build && . install/setup.sh && ros2 run fric_nodes plant": Case(tool="colcon", long=True, node="plant"),
     _IMPORT: Case((_map,)),
     "fric identify bags/run --terms coulomb,viscous,bias,asymmetry --out found": Case((_after(_IMPORT),)),
@@ -216,6 +242,7 @@ KNOWN: dict[str, Case] = {
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml": _long(),
     "fric diagnose bags/slide --blocks 8 --model config/nominal_model.yaml --out diagnosis": _long(),
     "fric doctor bags/slide": Case(),
+    "fric doctor": Case(),
     "fric compare bags/simulated bags/slide --out comparison": Case((_simulated,)),
     "fric model show found/model.yaml": Case((_found,)),
     "fric simulate found/model.yaml --force bags/slide --out bags/simulated": Case((_found,)),
@@ -245,7 +272,16 @@ KNOWN: dict[str, Case] = {
         )
     },
     **{
-        f"fric model {what}": Case() for what in ("effects", "effects dwell_time", "schema", "plants", "excitations", "methods")
+        f"fric model {what}": Case()
+        for what in (
+            "effects",
+            "effects dwell_time",
+            "effects presliding",
+            "schema",
+            "plants",
+            "excitations",
+            "methods",
+        )
     },
     "fric verify --out verification.html": _long(7200.0),
     "fric demo": _long(),
