@@ -84,7 +84,7 @@ def test_python_blocks_are_complete_programs(page: str) -> None:
 
 def test_the_members_that_extend_shows_are_members(tmp_path: Path) -> None:
     shown = [block for language, block in _blocks("docs/howto/extend.md") if language == "python"]
-    for constant, kind in (("EFFECT", "Effect"), ("IMPORTER", "Importer"), ("CHECK", "Check")):
+    for constant, kind in (("EFFECT", "Effect"), ("IMPORTER", "Importer"), ("CHECK", "Check"), ("CONTROLLER", "Controller")):
         block = next(block for block in shown if f"{constant} = " in block)
         (tmp_path / "member.py").write_text(block, encoding="utf-8")
         assert _run(tmp_path, sys.executable, "-c", f"import member; print(type(member.{constant}).__name__)").strip() == kind
