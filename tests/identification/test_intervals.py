@@ -66,7 +66,7 @@ def test_springs_that_make_up_for_the_filter_are_not_in_the_mechanism() -> None:
     limits = np.array([found.model.value(f"presliding.limit_{k}") for k in range(1, 11)])
     np.testing.assert_allclose(limits[limits > 0.0], LIMITS, rtol=0.02)
     assert found.model.value("coulomb.force") == pytest.approx(float(SPRINGS @ LIMITS), rel=2e-3)
-    assert any("make up for the filter" in note for note in found.notes)
+    assert any("compensate for the filter" in note for note in found.notes)
 
 
 def test_slow_strokes_say_that_they_hide_the_mass() -> None:

@@ -84,7 +84,7 @@ def test_at_rest_it_holds_everything_and_says_so(kind: str, plain: Record) -> No
     np.testing.assert_allclose(after.values, before.values, rtol=1e-9)
     np.testing.assert_allclose(after.standard_errors, before.standard_errors, rtol=1e-2)
     assert after.samples_used == before.samples_used
-    assert "held, not seen in the present motion: every parameter" in after.status
+    assert "held, not excited by the present motion: every parameter" in after.status
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -99,7 +99,7 @@ def test_constant_speed_holds_the_mass_and_names_it(kind: str, plain: Record) ->
         noise = 0.3 * float(random.standard_normal())
         estimator.update(plain.time[-1] + 1e-3 * k, float(plain.position[-1]) + 2e-4 * k, 8.0 + 15.0 * 0.2 + 0.8 + noise)
     after = estimator.estimate()
-    held = after.status.split("not seen in the present motion: ")[1]
+    held = after.status.split("not excited by the present motion: ")[1]
     assert "mass" in held or held == "every parameter"
     for name in NAMES:
         assert value(after, name) == pytest.approx(value(before, name), rel=0.05), name
@@ -160,7 +160,7 @@ def test_a_gap_a_clock_set_back_a_freeze_and_a_reset(kind: str, plain: Record) -
     estimator.reset()
     assert estimator.estimate().samples_used == 0
     assert np.all(np.isnan(estimator.estimate().standard_errors))
-    assert estimator.estimate().status == "frozen: unfreeze to go on learning"
+    assert estimator.estimate().status == "frozen: unfreeze to continue the estimation"
 
 
 def test_the_correction_is_that_of_the_textbook() -> None:

@@ -236,7 +236,7 @@ def test_a_stiffening_spring_shows_in_the_misfit() -> None:
     noise = 5e-4 * np.random.default_rng(1).standard_normal(8000)
     result = log_decrement(find_oscillation(Record(answer.t, answer.y[0] + noise, np.zeros(8000))))
     assert result.misfit > 5.0
-    assert "leaves more than noise" in result.status or "not to be relied on" in result.status
+    assert "larger than noise" in result.status or "not to be relied on" in result.status
     # The backbone is that of a Duffing spring: w^2 = 40 + (3/4) 20 A^2.
     curves = hilbert(find_oscillation(Record(answer.t, answer.y[0] + noise, np.zeros(8000)))).curves
     assert curves.frequency == pytest.approx(np.sqrt(40.0 + 15.0 * curves.amplitude**2), rel=0.015)

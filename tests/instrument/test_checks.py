@@ -243,7 +243,7 @@ def test_a_factor_that_is_none_of_the_known_ones_is_not_called_one(clean: Record
     assert finding.interval is not None
     assert finding.interval[0] < 1.0 / constant < finding.interval[1]
     assert "a current without its torque constant" in finding.detail
-    assert "suspected" not in finding.detail
+    assert "a likely reason" not in finding.detail
 
 
 def test_an_effort_that_never_changes_may_be_right(clean: Record) -> None:

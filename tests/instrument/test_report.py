@@ -19,7 +19,7 @@ def test_faults_come_first_and_say_what_to_do() -> None:
 def test_the_sentence() -> None:
     assert "delay between force and motion" in checks_sentence([FINE, LATE])
     assert checks_sentence([FINE]) == "No fault of the recordings was found."
-    assert "kept in mind" in checks_sentence([FINE, ODD])
+    assert "Warnings: " in checks_sentence([FINE, ODD])
 
 
 def test_text_is_escaped() -> None:

@@ -89,7 +89,7 @@ def test_a_velocity_made_from_the_folded_angle(turn: Turn, fold: FoldTo) -> None
 @pytest.mark.parametrize("rate", [4.0, 3.0, 2.0])
 def test_nearly_half_a_turn_between_samples_is_refused(turn: Turn, fold: FoldTo, rate: float) -> None:
     true = turn(rate=rate, duration=60.0)
-    with pytest.raises(RecordError, match="which way round can't be told; record at"):
+    with pytest.raises(RecordError, match="the direction can't be determined; record at"):
         unfolded(replace(true, position=fold(true.position, TURN, -math.pi)))
 
 

@@ -77,7 +77,7 @@ def reconciled(
         covariance[part] += np.outer(off[known], off[known])
     worst = free.names[int(known[np.argmax(np.abs(apart))])]
     there = begun.model.value(worst)
-    why = reason or "something acts that its assumptions leave out"
+    why = reason or "something acts that the method's assumptions exclude"
     said = (
         f"{why}, so that single samples can't be relied on; the intervals are as wide as those of the filtered equations "
         f"(inverse-dynamics), which give {worst} = {there:.5g} where this method gives {model.value(worst):.5g}"

@@ -22,7 +22,9 @@ def method_for(name: str | None, structure: Model | None = None) -> Method:
     """
     slips = structure is not None and structure.has_slip_dynamics
     if name == "inverse-dynamics" and slips:
-        raise InputError("--method", "inverse-dynamics gets a model with pre-sliding wrong", "use --method prediction-error")
+        raise InputError(
+            "--method", "inverse-dynamics gives wrong values for a model with pre-sliding", "use --method prediction-error"
+        )
     name = name or ("prediction-error" if slips else "inverse-dynamics")
     if name not in METHODS:
         raise InputError("--method", f"'{name}' is not known", f"use one of {', '.join(METHODS)}")

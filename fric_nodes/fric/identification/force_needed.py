@@ -44,6 +44,6 @@ def require_force(records: Sequence[Record], structure: Model | None = None, hel
     source = records[0].source if len(records) == 1 else ", ".join(record.source for record in records)
     raise IdentificationError(
         source,
-        f"the effort is {joined[0]:.6g} {records[0].units.force} throughout, so that no force tells the size of any parameter",
+        f"the effort is {joined[0]:.6g} {records[0].units.force} throughout, so that it determines no parameter",
         "record the effort, the motor current or the force command, or name its topic: --topic force_command=NAME",
     )

@@ -190,8 +190,8 @@ def _finding(found: _Found, problem: Problem, together: Array, motion: str, tria
     joined = ", ".join(names[:-1]) + f" and {names[-1]}" if len(names) > 1 else names[0]
     if found.kind == "unseen":
         effect = _effect(problem.model, names[0])
-        where = f" (where to see it: {effect.regime})" if effect is not None and effect.regime else ""
-        said = f"{joined} hardly show{'s' if len(names) == 1 else ''} in what was recorded{where}"
+        where = f" (it shows at {effect.regime})" if effect is not None and effect.regime else ""
+        said = f"{joined} {'is' if len(names) == 1 else 'are'} hardly excited in these recordings{where}"
     else:
         errors = " and ".join(_percent(float(together[k])) for k in found.members)
         remark = f" ({found.remark})" if found.remark else ""
@@ -227,11 +227,11 @@ def _helpful(
 
     best = min(trials, key=worst, default=None)
     if best is None or worst(best) > min(0.7 * max(float(together[k]) for k in members), _UNSEEN):
-        return "; no excitation within the travel, speed and force of these recordings would change that", None
+        return "; no excitation within the travel, speed and force of these recordings would improve that", None
     part = best.parts[0]
     settings = ", ".join(f"{name} {value:.3g}" for name, value in part.values.items())
     text = (
-        f"; {part.duration:.3g} s of {part.kind.title} ({part.kind.id}: {settings}) would bring "
+        f"; {part.duration:.3g} s of {part.kind.title} ({part.kind.id}: {settings}) would reduce the error of "
         f"{'it' if len(members) == 1 else 'them'} to {_percent(worst(best))}"
     )
     return text, {"kind": part.kind.id, "settings": dict(part.values)}

@@ -155,6 +155,8 @@ def instrument_errors(
             continue
         moved = [k for k in np.argsort(np.abs(change))[::-1].tolist() if abs(change[k]) > 0.3 * most]
         changes = ", ".join(f"{names[k]} by {100.0 * change[k]:+.2g} %" for k in moved)
-        message = f"{fault.title} can't be seen here: {fault.unit} of it would change {changes}. To see it, {fault.remedy}"
+        message = (
+            f"{fault.title} can't be detected here: {fault.unit} of it would change {changes}. To detect it, {fault.remedy}"
+        )
         found.append(Finding("instrument", tuple(names[k] for k in moved), message, fault.serious))
     return found

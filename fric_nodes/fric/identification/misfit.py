@@ -72,15 +72,15 @@ def refuse_undetermined(
     if by_force and scored.relative_force_error_percent > _HALF and not _more_than_constant(model, free, found, scored):
         raise IdentificationError(
             source,
-            f"the model explains no more of the force than a constant does (NOE {scored.noe:.4g} %): this force does not move "
-            f"this joint as {', '.join(free.names)} would have it",
+            f"the model explains no more of the force than a constant does (NOE {scored.noe:.4g} %): "
+            f"{', '.join(free.names)} don't relate this force to this motion",
             f"check {_joined(_reasons(model, found))}",
         )
     inertia = _without_inertia(model, free, covariance, found)
     if inertia:
         raise IdentificationError(
             source,
-            f"{inertia} is not determined: the fit drives it to zero, the force shows no inertia (NOE {scored.noe:.3g} %)",
+            f"{inertia} is not determined: the fit ends at zero, because the force shows no inertia (NOE {scored.noe:.3g} %)",
             f"give its value and hold it (--model FILE --hold {inertia}), record quicker reversals, or check "
             f"{_joined(_reasons(model, found))}",
         )
@@ -156,7 +156,7 @@ def _reasons(model: Model, found: Equations) -> list[str]:
     if float(np.mean(residual)) ** 2 > _EXPLAINS * float(np.mean(residual**2)):
         reasons.append("gravity or an offset of the force (a constant is left over: add the term bias)")
     if values[0] < 0.0 and values[1] < 0.0 and left < _EXPLAINS * float(spread @ spread):
-        reasons.append("the sign of the effort or of the position (the force brakes where it should drive)")
+        reasons.append("the sign of the effort or of the position (the force is against the acceleration)")
     bent = [np.sin(q), np.cos(q)] if model.units.position == "rad" else []
     if _least(np.column_stack([rigid, q, *bent]), force)[0] < _EXPLAINS * left:
         reasons.append("gravity or a spring (the force depends on the position: add stiffness, or use the plant pendulum)")

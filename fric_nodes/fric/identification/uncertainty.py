@@ -121,7 +121,7 @@ def problem_of(result: Identification, records: Sequence[Record], options: Optio
     if result.method == prediction_error.METHOD.id:
         return prediction_error.problem(result.model, free, records, found)
     known = ", ".join(part.METHOD.id for part in (inverse_dynamics, output_error, prediction_error))
-    raise InputError("--uncertainty", f"not to be had for the method '{result.method}'", f"use one of {known}")
+    raise InputError("--uncertainty", f"not available for the method '{result.method}'", f"use one of {known}")
 
 
 def _shifted(problem: Problem, moved: Array, point: Array) -> Array:
@@ -205,7 +205,7 @@ def _intervals(
             lower[k], upper[k] = walked.lower * problem.scale[k], walked.upper * problem.scale[k]
             for end, side in ((lower[k], "below"), (upper[k], "above")):
                 if not math.isfinite(end):
-                    notes.append(f"{problem.names[k]} has no limit {side}: these recordings don't set one")
+                    notes.append(f"{problem.names[k]} has no limit {side}: these recordings don't determine one")
     return Intervals(kind, probability, problem.names, estimate, errors, lower, upper, tuple(notes))
 
 

@@ -96,7 +96,7 @@ def warnings_of(model: Model, free: FreeParameters, covariance: Array) -> tuple[
         value, error = float(values[number]), float(errors[number])
         if bound[number]:
             unsure.append(name)
-            warnings.append(f"{name} lies on its bound ({value:.3g} {unit}): this recording shows nothing of it")
+            warnings.append(f"{name} lies on its bound ({value:.3g} {unit}): this recording does not determine it")
         elif not known[number]:
             unsure.append(name)
             warnings.append(f"{name} is not determined: {value:.3g} {unit}, with no standard error")

@@ -224,7 +224,7 @@ def judged(view: View, growing: bool = False) -> tuple[LagCurves | None, str]:
         found = curves.constant()
         sharp = found.contrast > _CONTRAST
     if not (found.inertia > _INERTIA and sharp):
-        return None, "the motion has too little acceleration: a lag would change next to nothing"
+        return None, "the motion has too little acceleration: a lag would hardly change the force"
     return curves, ""
 
 

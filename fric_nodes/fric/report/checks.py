@@ -55,9 +55,9 @@ def checks_sentence(findings: Sequence[Finding]) -> str:
     """The verdict in one sentence."""
     named = {verdict: sorted({CHECKS[f.check].title for f in findings if f.verdict == verdict}) for verdict in _ORDER}
     if named["fault"]:
-        return f"The recordings have faults that a fit would take for physics: {', '.join(named['fault'])}."
+        return f"The recordings have faults that would bias a fit: {', '.join(named['fault'])}."
     if named["warning"]:
-        return f"No fault of the recordings was found; to be kept in mind: {', '.join(named['warning'])}."
+        return f"No fault of the recordings was found. Warnings: {', '.join(named['warning'])}."
     return "No fault of the recordings was found."
 
 

@@ -79,10 +79,10 @@ def _figures(found: Comparison) -> Section:
     shaded(plot, sorted(spans, key=lambda span: span[0] - span[1])[:_MOST_SPANS])
     caption = "Drag to zoom, double click to go back."
     if found.where is not None:
-        caption += f" Shaded: where {100 * found.where.share:.0f} % of the energy of the difference sits."
+        caption += f" Shaded: the spans that hold {100 * found.where.share:.0f} % of the energy of the difference."
     blocks = [figure(plot, caption)]
     if found.where is not None:
-        blocks.insert(0, paragraph(f"The difference of {by} sits here: {found.where.regime}."))
+        blocks.insert(0, paragraph(f"The difference of {by} is largest at: {found.where.regime}."))
     return Section("Where they differ", tuple(blocks))
 
 

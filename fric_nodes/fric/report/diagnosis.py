@@ -32,10 +32,10 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
     """
     v = found.validation
     title = found.given.plant.title
-    learnt = f"{len(train)} recording{'s' if len(train) > 1 else ''} learnt from, {len(validation)} held back"
+    learnt = f"{len(train)} recording{'s' if len(train) > 1 else ''} for training, {len(validation)} held back"
     lead = (
-        f"{title[0].upper()}{title[1:]} '{found.given.joint}': {learnt}. Every figure here is on recordings "
-        "that no fit has seen; they can only take findings away."
+        f"{title[0].upper()}{title[1:]} '{found.given.joint}': {learnt}. Every error here is on recordings "
+        "that no fit has used. They add no finding; they can only withdraw one."
     )
     sections = [
         Section(
@@ -46,8 +46,8 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
                     [
                         (f"{v.noe_nominal:.3g} %", "normalised output error of the nominal model as given"),
                         (f"{v.noe_refit:.3g} %", "with its parameters fitted anew"),
-                        (f"{v.noe_augmented:.3g} %", "with what was missing added"),
-                        (f"{v.noise_floor:.3g} %", "what the instruments alone leave"),
+                        (f"{v.noe_augmented:.3g} %", "with the missing effects added"),
+                        (f"{v.noise_floor:.3g} %", "noise of the instruments alone"),
                     ]
                 ),
                 *([paragraph(found.force_errors_in_words)] if found.force_errors_in_words else []),
@@ -253,11 +253,9 @@ def _growth_section(found: Diagnosis) -> Section:
         (f"with {each.term}" if each.term else "refitted nominal", f"{100 * each.left:.3g} %", each.beside)
         for each in found.grown
     ]
-    note = "Left of the missing force's energy above the floor, on blocks of the learning recordings left out in turn."
+    note = "Share of the missing force's energy that is left above the noise floor, on training blocks left out in turn."
     if found.by_means:
-        note = (
-            "Left of the weighted squares by which the means of the runs learnt from miss the curve, above what chance leaves."
-        )
+        note = "Share of the weighted squared errors of the training means that is left, above chance."
     return Section(
         "How the model grew",
         (table(("model", "left", "with the next best instead"), rows, text_columns=(0, 2)), paragraph(note, "note")),
@@ -292,9 +290,9 @@ def _parameters_section(found: Diagnosis) -> Section:
 def _rest_section(found: Diagnosis) -> Section:
     rest = found.unexplained
     if rest.where is None:
-        text = "Nothing is left above what the instruments leave."
+        text = "Nothing is left above the noise of the instruments."
     else:
-        text = f"{100 * rest.share:.3g} % of the missing force's energy is left; it sits here: {rest.where.regime}."
+        text = f"{100 * rest.share:.3g} % of the missing force's energy is left, mostly at: {rest.where.regime}."
     return Section(
         "What is left, and what to record next", (paragraph(text), paragraph(f"Next experiment: {found.next_experiment}."))
     )

@@ -100,8 +100,8 @@ def _runs(outcome: Outcome) -> Section:
         if rows:
             blocks.append(table(head, rows, text_columns=(0, len(head) - 1)))
     note = (
-        "P and D acting are the gains as the recorded force shows them, with the delay of sampling and drive in them: a delay"
-        " takes damping P times itself away."
+        "P and D acting are the gains estimated from the recorded force. They include the delay of sampling and drive: a delay"
+        " T reduces the damping by P T."
     )
     problems = [f"run {run.number} is left out: {run.problem}" for run in runs if run.problem]
     more = (bullets(problems),) if problems else ()

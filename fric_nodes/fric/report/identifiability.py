@@ -33,10 +33,16 @@ def identifiability_section(found: Foreseen, units: dict[str, str]) -> Section:
             )
         )
     head = ("parameter", "at", "error if the others were known", "error expected", "times", "unit")
-    index = f"largest condition index {found.condition:.3g}" if found.condition < 1e6 else "some cannot be told apart at all"
+    index = (
+        f"largest condition index {found.condition:.3g}"
+        if found.condition < 1e6
+        else "some combinations are not determined at all"
+    )
     blocks = [paragraph(f"{found.motion}; {index}."), table(head, rows, text_columns=(0, 5))]
     serious = [finding.message for finding in found.findings if finding.serious]
     others = [finding.message for finding in found.findings if not finding.serious]
-    blocks.append(bullets(serious) if serious else paragraph("Every parameter shows, and none hides behind another."))
+    blocks.append(
+        bullets(serious) if serious else paragraph("The recordings determine every parameter, each apart from the others.")
+    )
     blocks += [paragraph(message[0].upper() + message[1:] + ".", "note") for message in others]
     return Section("What the recordings can tell, found before the fit", tuple(blocks))

@@ -67,7 +67,7 @@ def _score_rows(result: Identification) -> list[tuple[str, ...]]:
 
     rows = [row("fitted recordings", result.train)]
     if result.validation is not None:
-        rows.append(row("validation, not seen by the fit", result.validation))
+        rows.append(row("validation, not used by the fit", result.validation))
     return rows
 
 
@@ -94,7 +94,9 @@ def _force_section(name: str, model: Model, found: Equations) -> Section:
         ],
         "time [s]",
     )
-    caption = "Filtered and decimated as in the fit. The free run is led by the measured force alone from the first sample on."
+    caption = (
+        "Filtered and decimated as in the fit. The free run starts in the recorded state and takes the measured force alone."
+    )
     return Section(f"Measured and predicted force, {name}", (figure(plot, caption),))
 
 
@@ -124,7 +126,10 @@ def _correlation_section(result: Identification) -> Section:
         for k, name in enumerate(result.fitted)
     ]
     padded = [row + ("",) * (len(result.fitted) + 1 - len(row)) for row in rows]
-    note = "Near +1 or -1 two parameters can only be known together. Residual correlation in time is part of the covariance."
+    note = (
+        "Near +1 or -1 the recording determines only a combination of two parameters. The covariance includes the "
+        "correlation of the residuals in time."
+    )
     return Section("Correlation of the estimates", (table(("", *result.fitted), padded), paragraph(note, "note")))
 
 

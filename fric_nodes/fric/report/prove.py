@@ -80,7 +80,9 @@ def _confusion(score: Score) -> Section:
     )
     plot.update_xaxes(title_text="said first", tickangle=-50, automargin=True, showgrid=True)
     plot.update_yaxes(title_text="concealed", autorange="reversed", automargin=True, showgrid=True)
-    caption = "What was concealed against what the report says first; the diagonal is right. Pairs aren't in it."
+    caption = (
+        "Concealed effect over the one named first; right answers lie on the diagonal. Cases with two effects are left out."
+    )
     return Section("Taken for what", (figure(_plain(plot, 260 + 22 * len(concealed)), caption),))
 
 
@@ -108,8 +110,8 @@ def _calibration(score: Score) -> Section | None:
     )
     plot.update_xaxes(title_text="confidence stated", range=[0, 1.02])
     plot.update_yaxes(title_text="share that is right", range=[-0.02, 1.05])
-    caption = "Findings of one confidence, and how many of them are right. The area of a mark is the number of findings."
-    return Section("Is the confidence worth its name", (figure(_plain(plot, 420), caption),))
+    caption = "Share of right findings over the stated confidence. The area of a mark is the number of findings."
+    return Section("How well the confidence is calibrated", (figure(_plain(plot, 420), caption),))
 
 
 def _location(outcomes: Sequence[Outcome]) -> Section | None:
@@ -138,7 +140,7 @@ def _location(outcomes: Sequence[Outcome]) -> Section | None:
     plot.add_shape(type="rect", x0=1, x1=2, y0=0.8, y1=1, line={"color": COLOURS["second"], "dash": "dot"})
     plot.update_xaxes(title_text="length of the named spans over the shortest that hold as much", type="log")
     plot.update_yaxes(title_text="share of the energy held")
-    caption = "Where the mismatch was said to be in time, against where it is. The dotted field is the goal."
+    caption = "Named spans of time compared with those in which the mismatch is. The dotted field is the goal."
     return Section("Where it shows", (figure(_plain(plot, 440), caption),))
 
 
@@ -218,7 +220,7 @@ def prove_page(held: Examination, command: str) -> str:
         Section("Right", (_case_table(right) if right else paragraph("None."),)),
     ]
     lead = (
-        "Axes with concealed physics, simulated by an integrator that shares nothing with fric's own; the diagnosis was given "
-        "recordings and a nominal model, in another process. Then the key was opened."
+        "Axes with concealed physics, simulated by an integrator that shares no code with fric's own. The diagnosis was given "
+        "recordings and a nominal model, in another process. Then its answers were compared with the sealed key."
     )
     return render("Examination of the diagnosis", lead, [each for each in sections if each is not None])

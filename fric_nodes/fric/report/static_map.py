@@ -120,9 +120,7 @@ def _load_section(found: StaticMap) -> Section:
         blocks.append(table(("", "value", "95 %", "unit"), fitted, text_columns=(0, 3)))
         if law.line.scatter > float(np.median(half)):
             blocks.append(
-                paragraph(
-                    "The points scatter about the line by more than their intervals: friction isn't straight over the load."
-                )
+                paragraph("The points scatter about the line by more than their intervals: friction isn't linear in the load.")
             )
     _points(plot, "half the difference of both directions, 95 %", scale * load, friction, half)
     caption = (

@@ -74,7 +74,7 @@ def _choice_section(found: TensorProductIdentification) -> Section:
         if trial is found.chosen or trial in found.trials[:_SHOWN]
     ]
     text = (
-        "Each candidate is filled from three quarters of the slips or strokes and judged on the last one, in turn. Of those"
+        "Each candidate is fitted to three quarters of the slips or strokes and scored on the last one, in turn. Of those"
         " that aren't worse than the best by more than a standard error, the simplest is taken."
     )
     return Section("Choice of the cells", (paragraph(text), table(("grid", "points", f"held-out error [{unit}]"), rows)))
@@ -88,7 +88,7 @@ def tensor_product_report(found: TensorProductIdentification) -> str:
     slowest = min(float(branch.speed[0]) for branch in found.branches)
     entries = [
         (str(found.chosen.n_points), "grid points"),
-        (f"{significant(found.chosen.error, 3)} {units.force}", "off samples held out"),
+        (f"{significant(found.chosen.error, 3)} {units.force}", "force error on samples held out"),
         (f"{significant(slowest, 2)} {units.position}/s", "slowest grid point"),
         (str(int(np.unique(found.samples.block).shape[0])), "slips or stretches of motion"),
     ]

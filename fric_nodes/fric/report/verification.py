@@ -37,7 +37,7 @@ def _row(found: Figure) -> list[str]:
 
 def _section(check: Verification, evidence: Evidence) -> Section:
     blocks = [
-        paragraph(f"Held against: {check.source}.", "note"),
+        paragraph(f"Compared with: {check.source}.", "note"),
         table(("figure", "found", "goal", ""), (_row(found) for found in evidence.figures), text_columns=(0, 2, 3), wrap=(0,)),
         *(figure(plot, caption) for plot, caption in evidence.plots),
     ]
@@ -61,7 +61,7 @@ def verification_page(found: Sequence[tuple[Verification, Evidence]]) -> str:
     )
     summary = Section("In short", (counts, paragraph("Missed:"), bullets(missed)) if missed else (counts,))
     lead = (
-        "The physics of fric, held against something that does not come from fric: figures of the papers, closed forms, "
+        "The physics of fric, compared with something that does not come from fric: figures of the papers, closed forms, "
         "conservation laws, integrations by another method. Every number was measured when this page was made."
     )
     return render(TITLE, lead, [summary, *(_section(*each) for each in found)])

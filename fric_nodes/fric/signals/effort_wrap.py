@@ -93,7 +93,7 @@ def unwrapped(record: Record) -> Record:
     if float(np.ptp(found)) <= size or _left(record, found) > _BETTER * _left(record, effort):
         return record
     note = (
-        f"effort jumps by {size:.4g} {record.units.force} {which.size} times, and the motion goes with an effort that runs on: "
-        "taken as a number that wraps"
+        f"effort jumps by {size:.4g} {record.units.force} {which.size} times, and the motion agrees with one without "
+        "jumps: taken as a number that wraps"
     )
     return replace(record, effort=found, notes=(*record.notes, note))

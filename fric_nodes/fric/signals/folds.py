@@ -224,7 +224,7 @@ def _refuse_fast(record: Record, extent: float, spikes: Index, size: float = 0.0
         raise RecordError(
             record.source,
             f"position folds every {size:.4g} {record.units.position} and moves by {most:.3g} {record.units.position} from "
-            f"one sample to the next, first at {at:.3f} s: which way round can't be told",
+            f"one sample to the next, first at {at:.3f} s: the direction can't be determined",
             f"record at {2.5 / record.sample_time:.4g} Hz or more, move more slowly, or record an angle that doesn't fold",
         )
 

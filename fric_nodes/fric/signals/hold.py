@@ -91,17 +91,17 @@ class Hold:
     def told(self) -> str:
         """In one sentence."""
         if not np.isfinite(self.late):
-            return "how the force is held between samples isn't stated, and the motion can't tell: taken as sampled"
+            return "how the force is held between samples isn't stated nor determined by the motion: taken as sampled"
         after = f"{self.late:+.2f} +- {self.error:.2f} samples ({1e3 * self.late * self.sample_time:+.2g} ms) after them"
         start = f"how the force is held between its stamps isn't stated; it acts {after}: "
         late, error = self.likely
         if self.kind in _CLASSES:
             return f"{start}{_MEANS[self.kind]} (effort_hold: {self.kind})"
         if self.kind == "between":
-            return f"{start}a log slower than its controller; taken so"
+            return f"{start}as in a log slower than its controller; that lateness is used"
         if self.kind == "delayed":
             return f"{start}a hold explains {late:+.1f} of it, the rest is a delay; add a term 'delay' or 'actuator_lag'"
-        return f"{start}too unsure to tell how it is held; taken as {late:+.2f} +- {error:.2f} samples"
+        return f"{start}the kind of hold is not determined; taken as {late:+.2f} +- {error:.2f} samples"
 
 
 def _low_pass(values: Array, cutoff: float, h: float) -> Array:

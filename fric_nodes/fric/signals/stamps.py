@@ -229,6 +229,6 @@ def evened(record: Record) -> Record:
     if found.follows:
         return record
     about = f"stamps jitter by {1e3 * grid.spread:.3g} ms ({100.0 * grid.spread / grid.period:.2g} % of a sample)"
-    why = "the motion doesn't" if np.isfinite(found.error) and found.error < _HALF else "the motion can't tell"
+    why = "the motion doesn't" if np.isfinite(found.error) and found.error < _HALF else "the motion doesn't decide it"
     note = f"{about}, {why}: taken as even at {1.0 / grid.period:.5g} Hz; stamp where the sensor is read"
     return replace(record, time=grid.time - grid.time[0], notes=(*record.notes, note))

@@ -149,7 +149,7 @@ def _with_something_of_each(model: Model, free: FreeParameters, force: float) ->
             if declared[k].declaration.dimension == "F" and abs(values[k]) < 0.05 * force:
                 values[k] = _ASSUMED * force
                 unit = declared[k].declaration.unit(model.units)
-                notes.append(f"{declared[k].name} is next to nothing so far and taken to be {values[k]:.3g} {unit} here")
+                notes.append(f"{declared[k].name} is nearly zero so far and assumed to be {values[k]:.3g} {unit} here")
     return model.with_values(values), notes
 
 
@@ -225,7 +225,7 @@ def propose(
     trial = search(problem, list(kinds.values()), n_each, n_refining, progress)
     if trial is None:
         remedy = "widen them, or check that the model's values fit the machine"
-        raise DesignError("--design", "no excitation keeps the limits and shows anything within them", remedy)
+        raise DesignError("--design", "no excitation within the limits makes any parameter show", remedy)
     remarks = list(notes)
     if trial.problem.reachable is not None:
         blind = [name for name, seen in zip(problem.free.names, trial.problem.reachable, strict=True) if not seen]

@@ -183,7 +183,7 @@ class _Search:
             duration = share * self.time
             ranges = ranges_of(problem.model, problem.limits, problem.rig, duration)
             drawn = draw(kinds, ranges, self.inner, n_each, seed=1 + 100 * number)
-            progress(f"trying {len(drawn)} excitations of up to {duration:.3g} s")
+            progress(f"simulating {len(drawn)} excitations of up to {duration:.3g} s")
             found += [candidate for choice in drawn if (candidate := self.worth((choice,))) is not None]
         return sorted(found, key=lambda each: each.cost)
 
@@ -300,7 +300,7 @@ def search(
         progress(f"refining {start.title}: worst relative error {100.0 * start.cost:.3g} %")
         whole += work.refined(start, n_refining)
     whole.sort(key=lambda each: each.cost)
-    progress("holding the best to the limits with other parameters")
+    progress("checking the limits of the best with other parameter values")
     neighbours = problem.neighbours()
     finalists: list[tuple[float, Candidate]] = []
     for candidate in whole[:_CHECKED] + _different(whole[_CHECKED:], _CHECKED):

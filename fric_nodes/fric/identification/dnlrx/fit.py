@@ -184,7 +184,7 @@ def _judged(prepared: Prepared, model: DnlrxModel, undetermined: tuple[str, ...]
         warnings.append("it predicts force from motion; simulating motion from force with it isn't stable")
     if noe > _POOR:
         next_steps.insert(
-            0, "look whether force and position belong together (delay, sign), and whether faster sliding weakens"
+            0, "look whether force and position belong together (delay, sign), and whether friction decreases with speed"
         )
         return warnings, f"converged, but {noe:.3g} % of the force's variance is left: {'; '.join(dict.fromkeys(next_steps))}"
     if next_steps:

@@ -149,7 +149,7 @@ def prepare(records: Sequence[Record], options: Options) -> Prepared:
     if lowest > 0.1 * highest:
         raise IdentificationError(
             source,
-            f"position noise of {noise:.2g} {records[0].units.position} leaves no room below a travel of {2.0 * highest:.2g}",
+            f"position noise of {noise:.2g} {records[0].units.position} leaves none below a travel of {2.0 * highest:.2g}",
             "record longer strokes, or lower the cutoff",
         )
     return Prepared(tuple(used), step[0], lowest, highest, cutoff, found, tuple(notes))
@@ -162,10 +162,12 @@ def _far_enough(parts: list[Samples], notes: list[str], unit: str) -> list[Sampl
         shortest = min(part.start.travel for part in parts)
         notes.append(
             f"{len(parts) - len(used)} of {len(parts)} parts travel too little ({shortest:.2g} {unit}, the longest "
-            f"{longest:.2g}) to know how the springs stand, and are left out: begin every recording with a long stroke"
+            f"{longest:.2g}) to determine the state of the springs, and are left out: begin every recording with a long stroke"
         )
     before = sum(part.first for part in used) * used[0].stretch.sample_time
-    notes.append(f"{before:.2f} s before the longest strokes end (t_sl) aren't used: how the springs stand isn't known there")
+    notes.append(
+        f"{before:.2f} s before the longest strokes end (t_sl) aren't used: the state of the springs isn't known there"
+    )
     return used
 
 

@@ -334,7 +334,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     w = np.array([run.frequency for run in runs])
     if present[0] and present[2] and np.ptp(w) < _APART * float(np.max(w)):
         raise IdentificationError(
-            source, "the forced runs are too much alike: one frequency tells no mass from a spring", "force it at several"
+            source, "the forced runs are too much alike: one frequency can't separate mass and stiffness", "force it at several"
         )
     for run in runs:
         if present[3] and run.resting > MOST_RESTING:

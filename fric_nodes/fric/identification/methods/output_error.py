@@ -217,7 +217,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     free = free.without(set(without))
     messages = list(begun.messages)
     if without:
-        messages.append(f"{', '.join(sorted(without))}: left at nothing, since the free run is followed no better with it")
+        messages.append(f"{', '.join(sorted(without))}: set to no effect, because the free run does not improve with it")
     if not options.start_states and not best.runs.tied and best.runs.start_matters(best.model):
         options = replace(options, start_states="tied")
         tied = replace(best.runs, tied=True).weighed(best.model, force_errors(best.model, free, found))
@@ -228,7 +228,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
         free = free.without(set(lost))
         best = _minimised(best.model.with_values(_with(best.model, start, lost)), free, best.runs)
         covariance = _covariance(best, free, found, options, known)
-        messages.append(f"{', '.join(lost)}: a free run can't tell; held at the value that inverse dynamics finds")
+        messages.append(f"{', '.join(lost)}: a free run does not determine it; held at the value of inverse dynamics")
     trouble = _escape(best, options)
     if not trouble and not best.answer.converged:
         remedy = "start nearer to the machine's values (--model), or shorten the runs (--horizon)"
@@ -272,7 +272,7 @@ def _escape(best: _Found, options: Options) -> str:
 METHOD = Method(
     id="output-error",
     title="output error of a free run",
-    needs="as inverse dynamics; a structure that is nearly complete, since a free run adds up every error",
+    needs="as inverse dynamics; a nearly complete structure, because errors of the force add up in a free run",
     source="Ljung 1999, chapter 7; multiple shooting: Bock 1983",
     fit=fit,
     predicts="position",

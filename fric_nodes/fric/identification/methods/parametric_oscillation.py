@@ -110,7 +110,7 @@ def parametric_mechanics(
     if (spring and same and np.ptp(known[:, 1]) == 0.0) or (not spring and not np.any(known[:, 0])):
         raise IdentificationError(
             source,
-            "every run has the same feedback gains: they show no mass",
+            "every run has the same feedback gains, which does not determine the mass",
             "record runs whose proportional gains differ by a third or more, and give the gains (--gain P,D per recording)",
         )
     squares, decays = seen[:, 0] ** 2, seen[:, 0] * seen[:, 1]

@@ -361,7 +361,7 @@ def static_map(structure: Model, records: Sequence[Record], options: Options) ->
         notes=tuple(
             dict.fromkeys(
                 [
-                    f"{structure.plant.parameters[0].name} is held: static maps show nothing of it",
+                    f"{structure.plant.parameters[0].name} is held: static maps don't determine it",
                     *(note for look in looks for note in (*condensed(look.record.notes), *look.notes)),
                 ]
             )

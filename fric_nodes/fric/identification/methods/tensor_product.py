@@ -219,8 +219,8 @@ def _messages(
         )
     if not chosen.candidate.hysteresis and not samples.measured:
         warnings.append(
-            "no difference between speeding up and slowing down is seen; with the acceleration from the position a small one"
-            " wouldn't be: measure it (signal acceleration)"
+            "no difference between speeding up and slowing down is found. With the acceleration from the position a small one"
+            " would not be found: measure it (signal acceleration)"
         )
     by_map, by_model = (_rms(samples.friction - each) for each in (_by_map(table, samples), _by_model(model, samples)))
     if by_model > _ROUGH * by_map or through.misfit > 3.0:
@@ -232,7 +232,7 @@ def _messages(
     notes = [
         f"map: {chosen.candidate.text}, {chosen.n_points} grid points; {chosen.error:.3g} {f} off held-out samples",
         f"{100.0 * samples.left_out:.0f} % of the moving samples left out: slower than {samples.least_speed:.2g} {x}/s or"
-        f" with less than {samples.least_acceleration:.2g} {x}/s^2, where noise decides on speed or branch",
+        f" with less than {samples.least_acceleration:.2g} {x}/s^2, where noise dominates the speed or the branch",
         f"below {innermost:.2g} {x}/s friction is held at its value there",
     ]
     if few:

@@ -89,7 +89,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
         raise IdentificationError(
             source,
             "the force doesn't rise with the deformation of any spring",
-            "look whether effort and position have the same sign, or whether the joint has pre-sliding friction at all",
+            "check that effort and position have the same sign, or whether the joint has pre-sliding friction at all",
         )
     return _mechanism(base, structure, prepared, dnlrx, records, options)
 
@@ -143,7 +143,7 @@ def _mechanism(
         raise IdentificationError(
             records[0].source,
             "no mass and springs explain the force",
-            "look whether effort and position have the same sign, and excite faster motion",
+            "check that effort and position have the same sign, and excite faster motion",
         )
     values = base.values
     values[free.index] = found.linear
@@ -180,7 +180,7 @@ def _result(
     if found.buried:
         buried = ", ".join(linear[k] for k in found.buried)
         warnings.append(
-            f"{buried}: the force that belongs to it isn't clearly larger than what the springs leave unexplained, so that its "
+            f"{buried}: its force isn't clearly larger than the residual of the springs, so that its "
             "value may be off by more than its standard error"
         )
         status = f"converged; springs and Coulomb level are found, {buried} can't be relied on: record faster motion as well"
@@ -193,8 +193,8 @@ def _result(
     ]
     if found.stiffness.shape[0] < dnlrx.model.order[0]:
         notes.append(
-            f"{found.stiffness.shape[0]} of its {dnlrx.model.order[0]} springs are in the mechanism: the others only make up"
-            " for the filter, or aren't there"
+            f"{found.stiffness.shape[0]} of its {dnlrx.model.order[0]} springs are in the mechanism: the others only compensate"
+            " for the filter, or have no effect"
         )
     if dnlrx.trials:
         tried = ", ".join(f"{name(trial.order)} {trial.held_out_noe:.3g} %" for trial in dnlrx.trials)

@@ -104,7 +104,7 @@ def model_with(whole: Model, found: Estimate) -> Model:
 def status_of(state: State, samples_used: int, names: Sequence[str], excited: Mask) -> str:
     """The state in words: which parameters aren't determined, and what to do about it."""
     if state is State.FROZEN:
-        return "frozen: unfreeze to go on learning"
+        return "frozen: unfreeze to continue the estimation"
     if not samples_used:
         return "waiting for motion"
     if np.all(excited):

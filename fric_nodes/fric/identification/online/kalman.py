@@ -352,7 +352,7 @@ class KalmanIdentifier:
         status = status_of(self.state, self.samples_used, names, excited)
         if self._filter is not None and self.state is State.RUNNING and not np.all(seen):
             hidden = "every parameter" if not np.any(seen) else ", ".join(n for n, s in zip(names, seen, strict=True) if not s)
-            status += f"; held, not seen in the present motion: {hidden}"
+            status += f"; held, not excited by the present motion: {hidden}"
         rms = math.sqrt(self._energy / self._weight) if self._weight > 0 else math.nan
         return Estimate(
             names, values, np.asarray(errors, dtype=np.float64), covariance, excited, rms, self.samples_used,

@@ -273,7 +273,7 @@ def triangular(work: Any, columns: int, root: Any) -> None:
                 for j in range(i + 1, columns):
                     work[k, j] -= dot * work[i, j]
             root[i, i] = size
-            # The reflection may turn the sign of the whole column.
+            # The reflection may reverse the sign of the whole column.
             sign = 1.0 if alpha > 0.0 else -1.0
             for k in range(i + 1, n):
                 root[k, i] = sign * work[k, i]

@@ -101,8 +101,8 @@ def free_play(curve: Backbone) -> Play:
     covariance = np.linalg.pinv(best.jac.T @ best.jac) * 2.0 * best.cost / freedom
     play, error = 2.0 * float(best.x[1]) * smallest, 2.0 * smallest * float(np.sqrt(max(covariance[1, 1], 0.0)))
     if play > _SURE * error and play > 0.0:
-        status = f"the backbone bends as {play:.3g} +- {error:.2g} of free play make it; check with the term backlash"
+        status = f"the backbone bends as {play:.3g} +- {error:.2g} of free play would bend it; check with the term backlash"
     else:
         most = max(play, 0.0) + 2.0 * error
-        status = f"no free play is seen (at most {most:.2g}); to see less, let it swing on to smaller amplitudes"
+        status = f"no free play is found (at most {most:.2g}); to find less, record on to smaller amplitudes"
     return Play(play, error, float(best.x[0]), status)

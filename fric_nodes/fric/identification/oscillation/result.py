@@ -94,7 +94,7 @@ def status_of(natural: Natural, covariance: Array, asked: Mask, half_cycles: int
         )
     if misfit > 2.0:
         return (
-            "converged, but the model leaves more than noise: look at the curves over the amplitude, and identify the larger"
+            "converged, but the residual is larger than noise: look at the curves over the amplitude, and identify the larger"
             " and the smaller amplitudes apart",
             tuple(warnings),
         )

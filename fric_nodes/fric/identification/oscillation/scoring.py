@@ -73,4 +73,4 @@ def score_of(
         position_rmse=float(np.sqrt(np.mean(off**2))),
         n_samples=int(error.shape[0]),
     )
-    return score, ("force errors are relative to the inertial force: a free oscillation has no other",)
+    return score, ("force errors are relative to the inertial force: no other force acts in a free oscillation",)

@@ -74,7 +74,7 @@ def identify(
     n = found.turns.shape[0] - 1
     status, warnings = status_of(answer.natural, covariance, asked, n, misfit)
     if not answer.agrees:
-        status = "not converged: no oscillation of the model reads as the recorded one does; use log-decrement"
+        status = "not converged: no oscillation of the model matches the recorded one; use log-decrement"
     return FreeOscillation(
         natural=answer.natural,
         covariance=covariance,

@@ -278,18 +278,16 @@ def rig_compliance(found: Sequence[Presliding], position_unit: str, force_unit: 
     )
     trouble = ""
     if high <= 0.0:
-        trouble = "negative, which no spring is: the contact's own distance must fall with the load"
+        trouble = "because the compliance comes out negative: the contact's own distance must decrease with the load"
     elif own[0] <= 0.0:
         trouble = "the distances scatter too much; sample reversals faster and repeat them"
     if trouble:
-        text += (
-            f". Rig and contact can't be told apart, {trouble}. What can be said: {_bounds(found, position_unit, force_unit)}"
-        )
+        text += f". Rig and contact can't be told apart, {trouble}. Bounds: {_bounds(found, position_unit, force_unit)}"
         return replace(result, told_apart=False, text=text)
     if low > 0.0:
         text += f", as of a rig of {1.0 / compliance[0]:.3g} {force_unit}/{position_unit}"
     else:
-        text += f": none is seen, the rig is stiffer than {1.0 / high:.3g} {force_unit}/{position_unit}"
+        text += f": none is found, the rig is stiffer than {1.0 / high:.3g} {force_unit}/{position_unit}"
     text += f"; free of it the contact's own distance is {distance[0]:.3g} {position_unit} (95 %: {own[0]:.3g} to {own[1]:.3g})"
     return replace(result, text=f"{text}. This holds if the contact's own distance doesn't depend on the load")
 

@@ -68,9 +68,9 @@ def structure_of(velocity: Array, left: Array, error: Array) -> Structure:
     by_chance = [float(np.mean(each <= each[0])) for each in (rough, mirrored)]
     low, high = _range(speed, left**2)
     if by_chance[0] < _SIGNIFICANT:
-        return Structure("what is left at neighbouring speeds is alike", low, high)
+        return Structure("residuals at neighbouring speeds are alike", low, high)
     if len(pairs) >= _FEWEST and by_chance[1] < _SIGNIFICANT:
-        return Structure("what is left at one speed hangs together in both directions", low, high)
+        return Structure("residuals at one speed are correlated between both directions", low, high)
     return Structure("", low, high)
 
 

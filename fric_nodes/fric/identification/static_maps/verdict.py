@@ -22,13 +22,13 @@ _FEW_POINTS = 8  # fewer can be exchanged in too few ways
 def stribeck_sentence(choice: Choice) -> str:
     """What was found about the Stribeck effect, in one sentence."""
     if not np.isfinite(choice.p_value):
-        return "Whether friction falls with speed can't be tested: it takes at least four speeds in both directions"
+        return "Whether friction decreases with speed can't be tested: that needs at least four speeds in both directions"
     chance = f"F = {choice.f_value:.3g}, probability by chance {choice.p_value:.2g}"
     if choice.best.candidate.stribeck:
-        return f"Friction falls with speed before it rises (Stribeck): {chance}"
+        return f"Friction decreases with speed before it increases (Stribeck): {chance}"
     if choice.rival is None:
-        return f"No Stribeck effect: no fall of friction with speed fits better than none ({chance})"
-    return f"No Stribeck effect: what there is of a fall is not more than chance or isn't worth its parameters ({chance})"
+        return f"No Stribeck effect: no decrease of friction with speed fits better than none ({chance})"
+    return f"No Stribeck effect: the decrease of friction with speed isn't significant or isn't worth its parameters ({chance})"
 
 
 def messages_of(
@@ -49,7 +49,7 @@ def messages_of(
         if choice.best.candidate.stribeck and choice.best.values[-1] < 1.2 * min(speeds):
             said.append("the Stribeck velocity lies at the slowest speed: the level at rest is extrapolated")
         if max(speeds) < 1.1 * min(speeds):
-            said.append("all settled parts have one speed: viscous and falling friction can't be told from the Coulomb level")
+            said.append("all settled parts have one speed: viscous and Stribeck friction can't be told from the Coulomb level")
     said += _load_messages(means, loads, load_name)
     drifting = [mean for mean in means if mean.drift]
     if drifting:
@@ -63,13 +63,13 @@ def messages_of(
         if not compliance.told_apart:
             said.append("presliding.stiffness in the model is that of contact and rig in series")
     if any(each.coarse for each in presliding):
-        said.append("reversals are sampled too coarsely to see how motion begins: the initial stiffness is a lower bound")
+        said.append("reversals are sampled too coarsely at the beginning of motion: the initial stiffness is a lower bound")
     coarse = [start for start in break_away if start.resolution > 0.2 * abs(start.force[0])]
     if coarse:
         hardest = max(coarse, key=lambda start: start.resolution)
         said.append(
             f"at {len(coarse)} of {len(break_away)} break-aways the force changes by up to {2.0 * hardest.resolution:.2g} from"
-            f" one sample to the next ({hardest.source}): they are hardly known; sample faster, or raise the force more slowly"
+            f" one sample to the next ({hardest.source}): hardly known; sample faster, or raise the force more slowly"
         )
     return said
 
@@ -84,7 +84,7 @@ def _shape_message(means: Sequence[MeanForce], choice: Choice) -> list[str]:
     if not found.why:
         return []
     return [
-        f"{found.why}, which scatter is not in 99 of 100 cases: friction has a shape over the speed that no curve here has, "
+        f"{found.why}, which scatter does in 1 of 100 cases: friction depends on the speed in a way that no curve here has, "
         f"most of it from {found.low:.3g} to {found.high:.3g}; use the points there, and record more speeds"
     ]
 
@@ -105,14 +105,16 @@ def _load_messages(means: Sequence[MeanForce], loads: LoadLaw | None, load_name:
         for way, speeds in (("forward", forward), ("backward", backward)):
             if max(speeds) > 1.2 * min(speeds):
                 said.append(
-                    f"the speed {way} goes from {max(speeds):.3g} to {min(speeds):.3g} along the loads: what is due to the "
-                    "load can't be told from what is due to the speed; hold one speed"
+                    f"the speed {way} goes from {max(speeds):.3g} to {min(speeds):.3g} along the loads: the effect of the "
+                    "load can't be told from that of the speed; hold one speed"
                 )
         middle = float(np.median([point.interval()[1] - point.friction[0] for point in loads.points]))
         if loads.line.scatter > middle:
-            said.append("friction isn't straight over the load: between the loads use the table rather than the model's line")
+            said.append("friction isn't linear in the load: between the loads use the table rather than the model's line")
         if load_name == "pressure":
-            said.append("in the model the pressure [Pa] stands as normal_load; the force with which it pushes isn't part of it")
+            said.append(
+                "in the model the pressure [Pa] is the normal_load; the force of the pressure on the piston isn't part of it"
+            )
             low, high = _interval(loads)
             said.append(
                 f"the pressure pushes through an area of {1e6 * loads.area[0]:.4g} mm^2 (95 %: {1e6 * low:.4g} to "
@@ -139,7 +141,7 @@ def status_of(found: StaticMap, fallback: str) -> str:
     else:
         head = f"mapped over {n_speeds} speed(s)"
         wanted = (
-            [f"a ladder of at least six speeds in both directions, from {0.01 * speeds[-1]:.2g} to above {speeds[-1]:.2g}"]
+            [f"at least six speeds in both directions, from {0.01 * speeds[-1]:.2g} to above {speeds[-1]:.2g}"]
             if n_speeds < _FEW_SPEEDS
             else []
         )
@@ -151,7 +153,7 @@ def status_of(found: StaticMap, fallback: str) -> str:
         )
     sticking = [note for note in found.notes if "sticks and slips" in note]
     if sticking and not wanted:
-        return f"{head}; it sticks and slips below {speeds[0]:.3g}: to see slower motion, drive it more stiffly. {fallback}"
+        return f"{head}; it sticks and slips below {speeds[0]:.3g}: for slower motion use a stiffer drive. {fallback}"
     if wanted:
         return f"{head}. Next, record {'; and '.join(wanted)}"
     return f"{head}. {fallback}"

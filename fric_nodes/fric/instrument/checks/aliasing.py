@@ -52,7 +52,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     remedy = "record faster, or put a low-pass filter of less than half the rate before the sampling"
     mass = view.balance.value("mass")
     if amplitude < _FAULT * spread or not mass > 4.0 * view.balance.error("mass"):
-        return Finding("aliasing", "warning", f"{detail}: folded, picked up, or a vibration", amplitude, unit, remedy=remedy)
+        return Finding("aliasing", "warning", f"{detail}: aliased, picked up, or a vibration", amplitude, unit, remedy=remedy)
     _, motion = signal.welch(view.even.position, 1.0 / view.h, window=window, detrend="linear")
     floor = float(_usual(motion)[k])
     at = 2.0 * math.pi * frequency[k]
@@ -64,9 +64,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
             "aliasing", "warning", f"{detail}, and the axis vibrates with it", amplitude, unit, remedy="filter it out"
         )
     if visible >= _MISSING * amplitude:
-        said = "too fast for the position to tell whether the axis moves with it: folded, picked up, or real"
+        said = "too fast to determine from the position whether the axis moves with it: aliased, picked up, or real"
         return Finding("aliasing", "warning", f"{detail}, {said}", amplitude, unit, remedy=remedy)
-    said = "with which the axis does not move: folded from above half the rate, or picked up"
+    said = "with which the axis does not move: aliased from above half the rate, or picked up"
     return Finding("aliasing", "fault", f"{detail}, {said}", amplitude, unit, remedy=remedy)
 
 

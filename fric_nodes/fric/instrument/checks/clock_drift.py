@@ -27,7 +27,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     interval = (value - 1.96 * error, value + 1.96 * error)
     total = abs(growth.value) * view.n * view.h
     if growth.effect < growth.least and growth.left < _WARNING:
-        detail = f"a growth of {value:.3g} ppm would change {100 * growth.effect:.2g} % of the force: too little to be told"
+        detail = f"a growth of {value:.3g} ppm would change {100 * growth.effect:.2g} % of the force: too little to be detected"
         return Finding("clock_drift", "unknown", detail, value, "ppm", interval)
     known = math.isfinite(error) and abs(value) > _SURE * error and total > 1.5 * view.record.sample_time
     verdict: Verdict = "fault" if known and growth.left < _FAULT else "warning" if known and growth.left < _WARNING else "ok"

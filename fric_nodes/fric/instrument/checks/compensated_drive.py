@@ -29,29 +29,34 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     if turned(view)[0] is True:
         return Finding("compensated_drive", "unknown", "the position has the wrong sign")
     if not mass > _SURE * mass_error:
-        return Finding("compensated_drive", "unknown", "inertia does not show, so that friction has nothing to be held against")
-    remedy = "switch the drive's own friction compensation off, or record the current that it really gives"
+        return Finding("compensated_drive", "unknown", "the force shows no inertia, so that friction can't be compared with it")
+    remedy = "switch the drive's own friction compensation off, or record the motor current"
     if friction < -_SURE * error and abs(friction) <= view.balance.residual:
         detail = (
             f"the balance leaves {view.balance.residual:.3g} {view.record.units.force} unexplained, more than friction would be"
         )
         return Finding("compensated_drive", "unknown", detail, friction, view.record.units.force)
     if friction < -_SURE * error:
-        detail = f"inertia is right, but friction is negative ({friction:.3g}): the drive adds more than friction takes"
+        detail = f"the inertia is right, but friction is negative ({friction:.3g}): the drive overcompensates friction"
         return Finding("compensated_drive", "fault", detail, friction, view.record.units.force, remedy=remedy)
     expected = evidence.friction(speed)
     if not expected > 0.0:
-        return Finding("compensated_drive", "unknown", "without a model nobody knows how much friction there should be")
+        return Finding("compensated_drive", "unknown", "how much friction to expect is not known without a model")
     share = friction / expected
     interval = ((friction - 1.96 * error) / expected, (friction + 1.96 * error) / expected)
     # What the drive adds late or early looks like inertia too, so that the mass is as unsure as its error says.
     margin = _SURE * mass_error
     if mass + margin < evidence.inertia / _SAME_MASS or mass - margin > evidence.inertia * _SAME_MASS:
         return Finding(
-            "compensated_drive", "unknown", "the inertia isn't the model's either, see 'units'", share, "1", interval
+            "compensated_drive",
+            "unknown",
+            "the inertia differs from the model's, too; see the check 'units'",
+            share,
+            "1",
+            interval,
         )
     verdict: Verdict = "fault" if interval[1] < _FAULT else "warning" if interval[1] < _WARNING else "ok"
-    detail = f"the effort shows {100 * share:.0f} % of the friction that the model expects"
+    detail = f"the effort shows {100 * share:.0f} % of the model's friction"
     return Finding("compensated_drive", verdict, detail, share, "1", interval, "" if verdict == "ok" else remedy)
 
 

@@ -28,19 +28,19 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     if lag.at_edge or abs(value) > _CREDIBLE * curves.tau[-1]:
         return Finding("delay", "unknown", f"a lag of {1e3 * value:.3g} ms fits best: not credible as a delay")
     if 1.96 * error > _CREDIBLE * curves.tau[-1]:
-        return Finding("delay", "unknown", "any lag of the range that is looked at fits as well", value, "s", interval)
+        return Finding("delay", "unknown", "every lag in the searched range fits equally well", value, "s", interval)
     small = abs(value) <= _SAMPLES * view.record.sample_time
     if not small and abs(value) <= 4.0 * error:
         detail = f"a lag of {1e3 * value:.3g} ms fits best, which can't be told from none ({1e3 * error:.2g} ms standard error)"
         return Finding("delay", "unknown", detail, value, "s", interval)
     if not small and lag.effect < lag.least and lag.left < _WARNING:
-        detail = f"a lag of {1e3 * value:.3g} ms would change {100 * lag.effect:.2g} % of the force: too little to be told"
+        detail = f"a lag of {1e3 * value:.3g} ms would change {100 * lag.effect:.2g} % of the force: too little to be detected"
         return Finding("delay", "unknown", detail, value, "s", interval)
     verdict: Verdict = "ok" if small or lag.left > _WARNING else "fault" if lag.left < _FAULT else "warning"
     side = "effort comes late" if value > 0 else "motion comes late"
     detail = f"the {side}, by {1e3 * abs(value):.3g} ms ({1e3 * interval[0]:.3g} to {1e3 * interval[1]:.3g} ms)"
     if verdict == "ok":
-        detail = f"force and motion belong together within {1e3 * max(abs(value), 1.96 * error):.2g} ms"
+        detail = f"force and motion agree in time within {1e3 * max(abs(value), 1.96 * error):.2g} ms"
         return Finding("delay", verdict, detail, value, "s", interval)
     remedy = "record force and position on one clock, with equal filters, or add the effect 'delay' to the model"
     return Finding("delay", verdict, detail, value, "s", interval, remedy, correction=Correction(effort_shift=value))

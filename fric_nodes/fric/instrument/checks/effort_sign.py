@@ -32,7 +32,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     # out of what nothing explains by an order of magnitude.
     stands_out = mass < -_SURE * mass_error or abs(friction) > _ORDER * view.balance.residual
     if friction < -_SURE * error and not mass > _SURE * mass_error and not stands_out:
-        detail = f"the balance leaves {view.balance.residual:.3g} {unit} unexplained, too much for a sign to be told"
+        detail = f"the balance leaves {view.balance.residual:.3g} {unit} unexplained, too much to determine the sign"
         return Finding(
             "effort_sign", "unknown", detail, friction, unit, interval, "record at a higher rate, or smoother motion"
         )
@@ -43,7 +43,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         )
         if view.even.reference is not None and not wrong_position:
             detail = f"the effort would mean negative friction ({friction:.3g} {unit}){also}: its sign is wrong"
-        remedy = "turn the sign of the effort (scale: -1 in the import's mapping), after a look at where positive points"
+        remedy = "reverse the sign of the effort (scale: -1 in the import's mapping), after a check of the positive direction"
         return Finding(
             "effort_sign", "fault", detail, friction, unit, interval, remedy, correction=Correction(effort_factor=-1.0)
         )
@@ -51,13 +51,13 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         detail = "positive inertia with negative friction: not a matter of sign, see 'compensated_drive'"
         return Finding("effort_sign", "ok", detail, friction, unit, interval)
     if friction <= _SURE * error:
-        detail = f"friction of {friction:.2g} {unit} can't be told from none"
+        detail = f"a friction of {friction:.2g} {unit} can't be told from zero"
         if mass > _SURE * mass_error:
-            return Finding("effort_sign", "ok", "the effort accelerates the way that it points", friction, unit, interval)
+            return Finding("effort_sign", "ok", "the axis accelerates in the direction of the effort", friction, unit, interval)
         if mass < -_SURE * mass_error and view.balance.part("mass") > 3.0 * view.balance.residual:
             return Finding(
                 "effort_sign", "fault", "the axis accelerates against the effort", friction, unit, interval,
-                "turn the sign of the effort or of the position", correction=Correction(effort_factor=-1.0),
+                "reverse the sign of the effort or of the position", correction=Correction(effort_factor=-1.0),
             )  # fmt: skip
         return Finding("effort_sign", "unknown", detail, friction, unit, interval)
     return Finding("effort_sign", "ok", f"the effort loses energy to friction, {friction:.3g} {unit}", friction, unit, interval)

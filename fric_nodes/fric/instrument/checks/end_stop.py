@@ -184,7 +184,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         detail = f"it stands at {places} {view.record.units.position} under a force until the end: at a stop, or held there"
         return Finding("end_stop", "unknown", detail, remedy="record the reference, and the way back")
     if not found:
-        return Finding("end_stop", "ok", "it stands nowhere against a push that would move it elsewhere", 0.0, "s")
+        return Finding("end_stop", "ok", "the joint rests nowhere under a force that would move it elsewhere", 0.0, "s")
     time, units = view.record.time, view.record.units
     spans = tuple((float(time[stop.first]), float(time[stop.last - 1])) for stop in found)
     total = sum(b - a for a, b in spans)

@@ -35,11 +35,11 @@ def _run(evidence: Evidence) -> list[Finding]:
     spread = np.linalg.svd(columns[:, seen] / size[seen], compute_uv=False)
     count = int(np.sum(spread > _SMALL * spread[0]))
     if count == 4:
-        detail = "accelerations, speeds and directions tell inertia, dry and viscous friction and constant forces apart"
+        detail = "the motion separates inertia, dry and viscous friction and constant forces"
         return [Finding("excitation", "ok", detail, 4.0, "1")]
     together = _mixed(columns[:, seen] / size[seen], [n for n, s in zip(_NAMES, seen, strict=True) if s])
     hidden = [] if seen[0] else ["inertia does not show above the noise"]
-    detail = f"{count} of 4 directions are excited: " + "; ".join([*hidden, *together])
+    detail = f"{count} of 4 combinations are excited: " + "; ".join([*hidden, *together])
     remedy = "record a multisine, or moves from point to point at several speeds in both directions"
     return [Finding("excitation", "warning", detail, float(count), "1", remedy=remedy)]
 
@@ -51,7 +51,7 @@ def _mixed(columns: np.ndarray, names: list[str]) -> list[str]:
     for value, part in zip(spread, parts, strict=True):
         if value <= _SMALL * spread[0]:
             strong = [name for name, weight in zip(names, np.abs(part), strict=True) if weight > 0.3]
-            told.append(f"{' and '.join(strong)} can't be told apart" if len(strong) > 1 else f"{strong[0]} hardly shows")
+            told.append(f"{' and '.join(strong)} can't be told apart" if len(strong) > 1 else f"{strong[0]} is hardly excited")
     return told
 
 

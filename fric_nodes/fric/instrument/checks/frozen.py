@@ -96,7 +96,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     if float(np.ptp(record.effort)) == 0.0:
         return _constant(view)
     if view.travel == 0.0:
-        pushed = "the position never changes while the effort does: it rests, or the sensor is dead"
+        pushed = "the position never changes while the effort does: it rests, or the sensor gives no signal"
         return Finding("frozen", "unknown", pushed, remedy="push harder, or check the position sensor")
     spans, names = [], []
     for name, found in (("effort", _frozen_effort(record.effort, record.position)), ("position", _frozen_position(view))):

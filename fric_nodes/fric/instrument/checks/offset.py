@@ -30,7 +30,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     excess = value - expected
     spring, spring_error = view.balance.part("stiffness"), view.balance.error("stiffness")
     if abs(view.balance.value("stiffness")) > 4.0 * spring_error and spring > _SPRING * friction:
-        return Finding("offset", "unknown", "a spring acts: without its position of rest no offset can be told", value, unit)
+        return Finding(
+            "offset", "unknown", "a spring acts: without its relaxed position no offset can be determined", value, unit
+        )
     if abs(excess) < _WARNING * friction or abs(excess) < 4.0 * error:
         return Finding("offset", "ok", f"constant force of {value:.3g} {unit}, small beside friction", value, unit, interval)
     detail = f"a constant force of {value:.3g} {unit} beside a friction of {friction:.3g} {unit}"

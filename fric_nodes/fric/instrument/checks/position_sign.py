@@ -43,7 +43,7 @@ def turned(view: View) -> tuple[bool | None, str, float]:
             return True, "velocity and force", alike
         if alike > _SURE:
             return False, "the velocity", alike
-    return None, "neither a reference nor a velocity that would tell was recorded", math.nan
+    return None, "neither a reference nor a velocity was recorded", math.nan
 
 
 def _judge(view: View, evidence: Evidence) -> Finding:
@@ -53,7 +53,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     if not wrong:
         return Finding("position_sign", "ok", f"the position moves with {by} (correlation {alike:+.2f})", alike, "1")
     detail = f"the position moves against {by} (correlation {alike:+.2f})"
-    remedy = "turn the sign of the position (scale: -1 in the import's mapping)"
+    remedy = "reverse the sign of the position (scale: -1 in the import's mapping)"
     return Finding("position_sign", "fault", detail, alike, "1", remedy=remedy, correction=Correction(position_factor=-1.0))
 
 

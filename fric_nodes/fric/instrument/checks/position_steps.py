@@ -19,7 +19,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     except RecordError as error:
         return Finding("position_steps", "fault", error.problem, remedy=error.remedy)
     if not found:
-        return Finding("position_steps", "ok", "no step of the position and no spike that no motion could make", 0.0, "1")
+        return Finding("position_steps", "ok", "no step of the position and no spike that a motion could not make", 0.0, "1")
     spikes = any(note.startswith("spike") for note in found)
     remedy = (
         "check cable, shield and connector of the sensor" if spikes else "record a signal that doesn't fold where there is one"

@@ -155,11 +155,11 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     longest = max(float(time[b - 1] - time[a]) for a, b, _ in found)
     if wrong <= _FAULT and max(visits.values()) == 1 and longest > _HELD:
         # A limit cuts peaks off, again and again; a longer visit to a level is as well a force that was held there.
-        detail += "; once at each level, which a force that was held does too, and the balance does not contradict it"
+        detail += "; once at each level, as a constant force would, and the force balance does not contradict that"
         return Finding("saturation", "unknown", detail, share, "1")
     if wrong <= _FAULT:
         detail += "; the force balance holds there: the drive was at its limit, or the force was held"
-    remedy = "ask for less acceleration or speed, or raise the limit; parts where the balance breaks are left out of a fit"
+    remedy = "command less acceleration or speed, or raise the limit; a fit leaves out parts without a force balance"
     spans = tuple((float(time[a]), float(time[b - 1])) for a, b, _ in found)[:50]
     return Finding("saturation", "fault" if wrong > _FAULT else "warning", detail, share, "1", remedy=remedy, time=spans)
 

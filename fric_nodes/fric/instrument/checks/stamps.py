@@ -65,7 +65,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     bad = share > _FAULT or uneven > _JITTER_FAULT
     verdict: Verdict = "fault" if bad else "warning" if parts else "ok"
     remedy = (
-        "" if verdict == "ok" else "record on the machine that reads the sensor, stamp at the source; --time log may be evener"
+        ""
+        if verdict == "ok"
+        else "record on the machine that reads the sensor, stamp at the source; --time log may be more even"
     )
     detail = "; ".join(parts) or f"even to {100 * uneven:.1g} % of a step, nothing missing"
     return Finding("stamps", verdict, detail, share, "1", remedy=remedy, time=gaps)

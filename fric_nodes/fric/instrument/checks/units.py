@@ -84,9 +84,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         detail = "the position has the scale of the reference; the effort's can't be judged without a model"
         return Finding("units", "ok" if scale is not None else "unknown", detail if scale is not None else "there is no model")
     if not friction > 4.0 * error:
-        return Finding("units", "unknown", "the effort shows no friction to hold against the model")
+        return Finding("units", "unknown", "the effort shows no friction to compare with the model")
     if not evidence.friction(speed) > 0.0:
-        return Finding("units", "unknown", "the model has no friction to hold against")
+        return Finding("units", "unknown", "the model has no friction to compare with")
     mass, mass_error = view.balance.value("mass"), view.balance.error("mass")
     seen = view.balance.shows("mass")
     by_mass = [(math.log(mass / evidence.inertia), math.hypot(mass_error / mass, _MASS_KNOWN))] if seen else []
@@ -104,7 +104,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         signal, factor = min(candidates, key=lambda each: each[1].apart)
         if factor.apart < min(_AGREE, 0.5 * plain):
             return _of(signal, factor, evidence, "the model", view)
-    detail = f"mass or friction is off the model by a factor of {math.exp(plain):.3g}, and no one factor explains both"
+    detail = f"mass or friction differs from the model by a factor of {math.exp(plain):.3g}, and no single factor explains both"
     return Finding(
         "units", "warning", detail, math.exp(plain), "1", remedy="check the model's values, the units and the gear ratio"
     )
@@ -121,8 +121,8 @@ def _of(signal: str, factor: _Factor, evidence: Evidence, by: str, view: View) -
     name = named(factor.low, factor.high, evidence.settings)
     units = view.record.units
     per = f" ({1.0 / factor.value:.4g} {units.force if signal == 'effort' else units.position} per unit of it)"
-    detail = f"the {signal} is {factor.value:.4g} times what {by} expects"
-    detail += f": suspected is {name}" if name else f"{per}: {_OTHERS[signal]}"
+    detail = f"the {signal} is {factor.value:.4g} times that of {by}"
+    detail += f": a likely reason is {name}" if name else f"{per}: {_OTHERS[signal]}"
     remedy = f"state the unit of the {signal}, or its scale, in the import's mapping"
     exact = _exact(factor, evidence.settings)
     correction = Correction(position_factor=1.0 / exact) if signal == "position" else Correction(effort_factor=1.0 / exact)

@@ -101,7 +101,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     steady = float(np.std(view.velocity[view.usable])) < _CHANGES * view.speed
     found = _shifted(view, recorded, min(view.cutoff, _BAND / view.h), steady)
     if found is None:
-        return Finding("velocity_signal", "unknown", "too short: nothing is left beside the ends of the filter")
+        return Finding("velocity_signal", "unknown", "too short: the ends of the filter cover all of it")
     zero, best = int(np.argmin(np.abs(found.tau))), found.best
     if found.energy[zero] <= 1e-290:
         return Finding("velocity_signal", "fault", "the velocity is 0 throughout although it moves", 0.0, "1")
@@ -123,7 +123,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     if late:
         return _late(found)
     if interval[0] < 0.5 or interval[1] > 1.5:
-        return Finding("velocity_signal", "unknown", "the position is too rough to hold it against", scale, "1", interval)
+        return Finding("velocity_signal", "unknown", "the position is too coarse to compare it with", scale, "1", interval)
     return Finding("velocity_signal", "ok", f"the position's derivative, times {scale:.4g}", scale, "1", interval)
 
 
@@ -138,7 +138,7 @@ def _scaled(scale: float, interval: tuple[float, float], evidence: Evidence) -> 
     name = named(low * (1.0 - _DIFFERENCE), high * (1.0 + _DIFFERENCE), evidence.settings) if scale else ""
     sign = "with the opposite sign, " if scale < 0 else ""
     detail = f"the velocity is {sign}{abs(scale):.4g} times the derivative of the position"
-    detail += f": suspected is {name}" if name and abs(math.log(abs(scale))) > math.log(2.0) else ""
+    detail += f": a likely reason is {name}" if name and abs(math.log(abs(scale))) > math.log(2.0) else ""
     remedy = "correct its unit or sign in the import's mapping; fits use the position's derivative"
     correction = Correction(velocity_factor=1.0 / scale)
     return Finding("velocity_signal", "fault", detail, scale, "1", interval, remedy, correction=correction)
@@ -153,9 +153,7 @@ def _late(found: _Shifted) -> Finding:
         lag += float(0.5 * (before - after) / bend * step) if bend > 0.0 else 0.0
     detail = f"the velocity comes {1e3 * abs(lag):.3g} ms {'after' if lag > 0 else 'before'} the derivative of the position"
     if low < 0.0 < high:
-        detail = (
-            "the velocity is shifted against the derivative of the position; the motion repeats itself: by how much is open"
-        )
+        detail = "the velocity is shifted against the derivative of the position; the motion is periodic: the shift is open"
     remedy = "it is filtered or stamped late: don't use it with this position; fits use the position's derivative"
     return Finding("velocity_signal", "warning", detail, lag, "s", (low, high), remedy)
 
