@@ -1,4 +1,4 @@
-"""The axis as a controller sees it: a model moved by a drive of limited force, seen through an encoder and a force signal.
+"""A simulated axis for a controller: a model moved by a drive of limited force, measured by an encoder and a force signal.
 
 The force is held between commands; the position is the encoder's, a whole number of its steps; the velocity is the difference
 quotient of encoder positions that a drive would report; the effort is the mean force that really acted since the last

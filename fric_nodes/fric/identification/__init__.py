@@ -1,4 +1,4 @@
-"""Identification: parameters from recordings, with honest uncertainty.
+"""Identification: parameters from recordings, with standard errors that account for correlated residuals.
 
 Every method is one file with a constant ``METHOD`` and the same contract: ``fit(structure, records, options) ->
 Identification``.

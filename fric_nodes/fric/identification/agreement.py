@@ -1,4 +1,4 @@
-"""Whether a method that works on the raw samples agrees with the filtered equations, and intervals that say so if it doesn't.
+"""Whether a method that works on the raw samples agrees with the filtered equations, and wider intervals if it doesn't.
 
 Output error and prediction error use what inverse dynamics filters away, which makes them sharper where a recording is what
 they take it for: forces known between the samples, white errors, even stamps. Both kinds estimate the same parameters, so that

@@ -62,7 +62,7 @@ def drawn_series(series: Array, n: int, length: int, starts: Index, random: np.r
 
 @dataclass(frozen=True, eq=False)
 class Bootstrap:
-    """What the replicates say.
+    """The replicates and their spread.
 
     Attributes:
         estimates: shape ``(n_replicates, n_parameters)``; those whose fit did not converge are left out.

@@ -52,7 +52,7 @@ def residual_of_filters(model: Model, found: Equations) -> Array:
 
 
 def _seen(position: Array, noise: Array, like: Array) -> Array:
-    """``position`` as the instrument of the signal ``like`` sees it; ``noise`` of unit size says how the noise goes."""
+    """``position`` as measured by the instrument of the signal ``like``; ``noise`` of unit size is the course of its noise."""
     step = step_of(like)
     white = math.sqrt(max(noise_of(like) ** 2 - step**2 / 12.0, 0.0))
     seen = position + white * noise

@@ -1,7 +1,7 @@
 """The force that acted on an axis beside the recorded one and the model's: measured without inverse dynamics.
 
 A model that follows a recording sample by sample (:mod:`fric.identification.innovations`) is corrected after each one:
-its velocity by beta e/h. A force error d that lasts asks for the same change of velocity in every interval, so that
+its velocity by beta e/h. A constant force error d needs the same change of velocity in every interval, so that
 
     d_k = c beta e_k / h^2,   c = force over the rate of change of velocity that it brings,
 

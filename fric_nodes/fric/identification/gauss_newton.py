@@ -7,7 +7,7 @@ Gauss-Newton steps with Levenberg-Marquardt damping on the normal equations, col
 bounds by an active set: a component that would leave is put on its bound and the rest solved again. The damping follows the
 ratio of actual to predicted decrease (Nielsen 1999). A step needs only sums over the residuals, so that an iteration costs its
 n_parameters + 1 evaluations and little else; decomposing the whole Jacobian costs more than the simulations that it comes from.
-Where evaluations are dear, every other Jacobian may be Broyden's secant update of the one before, which costs none, and the
+Where evaluations take long, every other Jacobian may be Broyden's secant update of the one before, which costs none, and the
 columns of the others may come from several threads.
 Source: Madsen, Nielsen, Tingleff 2004, sections 3.2 and 3.4; the active set is that of Bertsekas 1982 for simple bounds.
 """

@@ -9,7 +9,7 @@ well unless
 
 is larger than its 99.9 % quantile; with less than a tenth of the variance explained, that decides.
 
-What leaves more than half of the force is said not to describe the recording. Which change of the linear equation
+A model that leaves more than half of the force does not describe the recording: a warning. Which change of the linear equation
 u = m a + F sgn v + c v + b makes its sum of squares less than half names the likely reason: a term of the position (gravity, a
 spring), a shift in time, or all of its dynamic terms being negative (a sign); likewise a constant that the model leaves over.
 Without one, the force is another one's.

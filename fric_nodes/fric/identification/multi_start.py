@@ -1,4 +1,4 @@
-"""Several starts for one search: the best end of all, and what the others say about it.
+"""Several starts for one search: the best minimum, and how the others compare with it.
 
 A sum of squares over a free run has wrong valleys (a Stribeck velocity, a stiffness, a play), and a search ends in the nearest.
 Starts are spread over the logarithms of the parameters by Latin hypercube sampling (McKay, Beckman, Conover 1979): within what

@@ -1,7 +1,7 @@
 """Profile likelihood: how far a parameter can be moved before no choice of the others makes up for it.
 
 A nonlinear parameter (a Stribeck velocity, a bristle stiffness) may be well bounded on one side and hardly on the other, which
-no standard error can say. With C(x) the smallest sum of squares when the parameter is held at x, the interval is where
+a standard error can't express. With C(x) the smallest sum of squares when the parameter is held at x, the interval is where
 
     D(x) = (C(x) - C_min) [(J'J)^-1]_jj / s_j^2 <= chi^2_1(P),
 

@@ -56,8 +56,8 @@ class Identification:
         warnings: what a user should know before trusting the values.
         notes: what was dropped or left out of the recordings, and why.
         train: score on the recordings that were fitted.
-        validation: score on recordings that no fit has seen, or None.
-        foreseen: what was known before the fit about what the recordings can tell, or None.
+        validation: score on recordings that no fit has used, or None.
+        foreseen: what the recordings can determine, as found before the fit, or None.
         checks: what was found about the recordings themselves.
     """
 
@@ -86,7 +86,7 @@ class Identification:
         return {}
 
     def remarks_on(self, validation: Sequence[Record]) -> tuple[str, ...]:
-        """What the method has to say about recordings that the fit has not seen, besides the model's score."""
+        """Remarks of the method on recordings that the fit has not used, besides the model's score."""
         return ()
 
 
@@ -101,7 +101,7 @@ class Method:
         source: paper.
         fit: structure (a model whose values are the start), recordings and options to a result.
         predicts: what it compares with the recording sample by sample, for statements before a fit: ``force`` along the motion,
-            ``position`` from one sample to the next; empty where a fit sees something else.
+            ``position`` from one sample to the next; empty where a fit uses something else.
         needs_force: False where no force need act, as in a free oscillation; otherwise one that never changes is refused.
         uses: names of the common settings that it honours; another one that is given is refused.
         settings: type of its options: the common ones, or a dataclass derived from them with settings of its own.

@@ -4,7 +4,7 @@ Errors of the position make the acceleration of the rows noisy, which pulls the 
 what the rows tell about it (errors in variables, Fuller 1987). A wider window averages both sides of the equations alike, so
 that nothing but noise is lost until the motion itself is averaged away. So the closest rows are taken whose mass is pulled by
 less than a quarter of its standard error, with which an interval of 90 % still holds 89 %; where no rows are, those with the
-least error in all, of which the fit then takes off what it knows (:mod:`.noise_bias`).
+least error in all, whose known bias the fit then removes (:mod:`.noise_bias`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How what a method predicts answers to each parameter: the Jacobian that statements about identifiability start from.
+"""Sensitivity of a method's prediction to each parameter: the Jacobian on which statements about identifiability rest.
 
 Column k is the derivative of the prediction (the force along the motion, or the position at the next sample) to parameter k,
 by central differences of the compiled model. What a recording of that motion is worth follows from it: with A = J'J and S the
@@ -47,7 +47,7 @@ _BLIND = 1e-9  # of the largest: a direction of which nothing is known
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What recordings say about parameters, each in units of its size; see the module.
+    """Information of recordings on the parameters, each in units of its size; see the module.
 
     Attributes:
         bread: A, shape ``(n_free, n_free)``.
@@ -134,7 +134,7 @@ def settled(view: View, options: Options) -> Options:
 
 
 class ForceView:
-    """The force along the filtered motion, as inverse dynamics sees it, which takes the shift due to its filters off itself."""
+    """The force along the filtered motion, as inverse dynamics uses it, which removes the shift due to its filters."""
 
     drifts = False
 
@@ -158,7 +158,7 @@ class ForceView:
 
 
 class StepView:
-    """The position from one sample to the next, as prediction error sees it.
+    """The position from one sample to the next, as prediction error uses it.
 
     Args:
         model: decides on the steps of the simulation.

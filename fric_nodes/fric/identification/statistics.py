@@ -4,8 +4,8 @@ For residuals r_k with Jacobian rows J_k the estimate's covariance is the sandwi
 variance of the scores s_k = w_k J_k r_k. S is estimated from the autocovariances of the scores with Bartlett weights,
 S = G_0 + sum_l (1 - l/(L+1)) (G_l + G_l'), which stays positive semi-definite (Newey and West 1987). The lag L grows with the
 correlation that is there: the first-order rule of Andrews 1991, evaluated on the residuals, with 4 (n/100)^(2/9) as its floor.
-What that estimate lacks in a
-short series widens it (Kiefer and Vogelsang 2005). Many white residuals of equal variance give back the textbook covariance.
+In a short series that estimate is too small and is widened (Kiefer and Vogelsang 2005). Many white residuals of equal variance
+give back the textbook covariance.
 
 Where A isn't J'J (noise in J itself, see :mod:`fric.identification.methods.prediction_error`) or the scores are no products of
 a residual and a row, both are handed in as they are.

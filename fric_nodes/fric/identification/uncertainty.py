@@ -4,7 +4,7 @@
 output error, whose residuals are correlated over the whole recording, force errors put together from blocks and led through the
 runs. ``profile`` walks along each nonlinear parameter while the others make up for it; linear ones keep their standard error.
 Spread over recordings and over restarts need no assumption about the residuals; where they are wider than the intervals,
-the model lacks something that differs between recordings, or the misfit has several valleys.
+the model leaves out something that differs between recordings, or the misfit has several minima.
 """
 
 from __future__ import annotations

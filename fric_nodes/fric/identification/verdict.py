@@ -1,4 +1,4 @@
-"""What a recording could not tell, said before and after a fit.
+"""What a recording could not determine: messages before and after a fit.
 
 Before: parameters whose columns are the same but for a factor (a bias and an asymmetric Coulomb level while sliding) can't
 be told apart; the later one is held and named, with the experiment that would separate them. After: parameters with large

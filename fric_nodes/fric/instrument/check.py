@@ -5,8 +5,8 @@ given; it never fits a friction law. A verdict is one of four:
 
 ``ok``       nothing wrong within what can be seen;
 ``warning``  something limits what can be identified, or may be meant so;
-``fault``    what the recording says is not what the axis did: a fit would be wrong;
-``unknown``  these recordings can't tell, and the detail says why.
+``fault``    the recording differs from what the axis did: a fit would be wrong;
+``unknown``  these recordings don't decide it; the detail gives the reason.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ class Evidence:
 
     Attributes:
         records: recordings of one joint.
-        model: nominal model whose given values are to be believed, or None.
+        model: nominal model whose given values are taken as right, or None.
         settings: known numbers, such as ``gear_ratio`` [1].
     """
 

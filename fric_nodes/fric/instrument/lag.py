@@ -7,7 +7,7 @@ are kept per window, so that a lag that grows, and intervals by the jackknife ov
 
 What can shift is the inertial force alone: any force of position and speed may have another shape than was thought. So the part
 of the acceleration that no function of position and speed makes has to stand out of the residual. In a single tone, a ramp, or
-moves at one speed there is none, and no lag can be told. And a controller answers to the noise of the position, which the
+moves at one speed there is none, and no lag can be told. A controller also reacts to the noise of the position, which the
 acceleration has too: the two seem shifted. What that can make is the noise's share of the acceleration, times the inertial
 force. An effect below that, at 95 %, or below what matters, can't be told either.
 """

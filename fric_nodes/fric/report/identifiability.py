@@ -32,7 +32,7 @@ def identifiability_section(found: Foreseen, units: dict[str, str]) -> Section:
                 units[name],
             )
         )
-    head = ("parameter", "at", "error if the others were known", "error expected", "times", "unit")
+    head = ("parameter", "value", "standard error if the others were known", "expected standard error", "ratio", "unit")
     index = (
         f"largest condition index {found.condition:.3g}"
         if found.condition < 1e6

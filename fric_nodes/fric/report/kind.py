@@ -1,4 +1,4 @@
-"""How a result becomes a page: reports know results, results don't know reports."""
+"""How a result becomes a page: reports import results, results import no reports."""
 
 from __future__ import annotations
 

@@ -75,10 +75,10 @@ def _confusion(score: Score) -> Section:
             texttemplate="%{text}",
             colorscale=[[0.0, "#dbe7f3"], [1.0, COLOURS["after"]]],
             showscale=False,
-            hovertemplate="concealed: %{y}<br>said first: %{x}<br>cases: %{z}<extra></extra>",
+            hovertemplate="concealed: %{y}<br>named first: %{x}<br>cases: %{z}<extra></extra>",
         )
     )
-    plot.update_xaxes(title_text="said first", tickangle=-50, automargin=True, showgrid=True)
+    plot.update_xaxes(title_text="named first", tickangle=-50, automargin=True, showgrid=True)
     plot.update_yaxes(title_text="concealed", autorange="reversed", automargin=True, showgrid=True)
     caption = (
         "Concealed effect over the one named first; right answers lie on the diagonal. Cases with two effects are left out."

@@ -1,1 +1,1 @@
-"""What a recording's signals are like, asked by every room and answered once: resolution, noise, stamps, hold of the force."""
+"""What a recording's signals are like, determined once for every room: resolution, noise, stamps, hold of the force."""

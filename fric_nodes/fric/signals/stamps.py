@@ -79,7 +79,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Jitter:
-    """What the motion says of stamps that jitter.
+    """Whether the motion follows stamps that jitter.
 
     Attributes:
         share: of the jitter that the motion follows: 0 if the position was read evenly, 1 if at its stamp; NaN: can't be told.

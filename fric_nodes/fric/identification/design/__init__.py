@@ -1,7 +1,7 @@
 """Experiment design: the next excitation, within limits, that most reduces the worst uncertainty of a model's parameters.
 
-``limits`` says what to keep within, ``settings`` what is worth trying, ``trial`` what one excitation is worth, ``search`` finds
-the best, ``proposal`` starts from a fit and writes the result down.
+``limits`` holds the limits of the machine, ``settings`` the settings to try, ``trial`` evaluates one excitation, ``search``
+finds the best, ``proposal`` starts from a fit and writes the result down.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Both signals pass the same zero-phase low-pass (Amthor et al. 2008, section 3.2: 50 Hz). In each stretch the samples before t_sl
 are left out, see :mod:`fric.friction.dnlrx_regression`; from t_sl on the deformations of all springs are known, provided
 that no threshold exceeds half of the travel that ends there. A stretch that never travels far would limit all thresholds to
-what it can vouch for, and is left out instead.
+its own short travel, and is left out instead.
 
 The thresholds are searched between the noise of the filtered displacement and half of that travel.
 """
@@ -68,7 +68,7 @@ class Prepared:
         parts: the stretches that are used.
         sample_time: T [s].
         lowest: smallest threshold to look for [x].
-        highest: largest threshold that every part can vouch for [x].
+        highest: largest threshold that every part determines [x].
         cutoff: of the low-pass [Hz].
         found: the equations of the recordings, at full length.
         notes: what was left out, and why.

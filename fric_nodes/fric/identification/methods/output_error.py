@@ -9,8 +9,8 @@ state matters. Several starts (``starts``) search for a better minimum than the 
 Source: Ljung 1999, chapter 7 (output error).
 
 Standard errors: in a free run an error of the force adds up for as long as friction lets it, so that the residuals of a whole
-recording are few independent numbers, however many samples they have; no window over their correlation sees that. The errors
-of the force themselves are short. They are measured (:mod:`fric.identification.force_errors`), put together anew from
+recording are few independent numbers, however many samples they have; no window over their correlation accounts for that. The
+errors of the force themselves are short. They are measured (:mod:`fric.identification.force_errors`), put together anew from
 blocks, and led through the same runs; with J the Jacobian, J' times what they change in the position is a draw of the score,
 and the covariance is (J'J)^-1 S (J'J)^-1 with S the mean square of the draws. The noise of the position,
 and the error of the runs' start states, drawn with them, add their part. J is made of secants as wide as the uncertainty.

@@ -195,7 +195,7 @@ class _Fit:
 def _rated(square: float, known: float) -> float:
     """By how much the power of the drawn noise is to be multiplied, where the innovations have the power ``square``.
 
-    Noise can't explain more than there is; and where it explains nearly all, what it lacks is the error of its own estimate.
+    Noise can't explain more than there is; and where it explains nearly all, the difference is the error of its own estimate.
     """
     return square / known if known > _NEARLY_ALL * square else 1.0
 

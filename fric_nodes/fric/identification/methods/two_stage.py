@@ -1,7 +1,7 @@
 """Two-stage identification: thresholds of Maxwell springs by a search, everything else inside it by linear least squares.
 
 The search is that of :mod:`.dnlrx.fit` (Amthor et al. 2008, section 3.1) and gives a DNLRX, an inverse model of filters that
-holds at one sample time. A controller or a simulation wants a mechanism, so with the thresholds found the mechanism that Eq.
+holds at one sample time. A controller or a simulation needs a mechanism, so with the thresholds found the mechanism that Eq.
 8 starts from is solved for as well:
 
     u = m a + sum_j c_j r_j(x, v) + sum_i k_i delta_i,   c_j linear parameters of the force terms (viscous, bias, ...),

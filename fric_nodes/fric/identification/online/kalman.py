@@ -5,7 +5,7 @@ directions, every parameter in which the force is linear; with five times its st
 be used again, that is where the filter begins. Nonlinear parameters begin at the structure's values. What has been recorded
 meanwhile then goes through the filter, for each of the nonlinear ones from a few start values; the likeliest goes on. From it
 two passes with a louder force lead near enough for slopes to hold: with values far off, the innovations would be taken for
-kicks, and what the first samples say be believed at the wrong slopes.
+kicks, and the first samples would be used with wrong slopes.
 
 A step change of friction shows as force residuals that stay on one side for longer than they ever do. What was known of the
 terms' linear parameters is then given up; if it goes on, what was known of all.

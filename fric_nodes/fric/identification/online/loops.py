@@ -29,7 +29,7 @@ def scatter(
 ) -> None:  # fmt: skip
     """Points around the mean: itself, and one on either side along each column of the root; the force is another each time.
 
-    They may lie around another point, what later samples say about the beginning of the interval, along the columns of a root
+    They may lie around another point, what later samples tell about the beginning of the interval, along the columns of a root
     of what that leaves unknown.
 
     Args:
@@ -147,7 +147,7 @@ def tell(
     mean: Any, root: Any, seen: int, y: float, noise: float, limit: float, columns: Any, shift: Any, narrow: Any, widen: Any,
     work: Any,
 ) -> bool:  # fmt: skip
-    """What the measured state at the end of an interval says about its beginning, and mean and root at its end with that.
+    """Information of the measured state at the end of an interval about its beginning, and mean and root at its end with that.
 
     Args:
         mean: predicted, shape ``(n,)``; corrected in place, as is the root.

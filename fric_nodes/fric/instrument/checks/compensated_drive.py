@@ -1,7 +1,7 @@
 """A drive that compensates friction by itself: the effort recorded is what the controller asked for, friction left out.
 
 The value is the friction seen in the effort, over the model's at the same speed. Inertia shows as it should, friction
-doesn't. It takes a model to say so, unless the drive overdoes it: then the axis seems to give energy although its inertia is
+doesn't. That needs a model, unless the drive overcompensates: then the axis seems to give energy although its inertia is
 right.
 """
 

@@ -27,7 +27,7 @@ def _run(evidence: Evidence) -> list[Finding]:
     share = min(forward, backward) / (forward + backward)
     verdict: Verdict = "warning" if share < _WARNING else "ok"
     name = "backward" if backward < forward else "forward"
-    detail = f"{100 * share:.2g} % of the way is {name}"
+    detail = f"{100 * share:.2g} % of the travel is {name}"
     remedy = "" if verdict == "ok" else f"record {name} motion too, over the same places and speeds"
     return [Finding("direction", verdict, detail, share, "1", remedy=remedy)]
 

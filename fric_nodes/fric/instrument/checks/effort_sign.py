@@ -60,7 +60,9 @@ def _judge(view: View, evidence: Evidence) -> Finding:
                 "reverse the sign of the effort or of the position", correction=Correction(effort_factor=-1.0),
             )  # fmt: skip
         return Finding("effort_sign", "unknown", detail, friction, unit, interval)
-    return Finding("effort_sign", "ok", f"the effort loses energy to friction, {friction:.3g} {unit}", friction, unit, interval)
+    return Finding(
+        "effort_sign", "ok", f"the axis loses energy to friction, as it should: {friction:.3g} {unit}", friction, unit, interval
+    )
 
 
 CHECK = Check("effort_sign", "sign of the force", "sliding motion under force", each(_judge))

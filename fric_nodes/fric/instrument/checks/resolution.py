@@ -48,7 +48,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     ):
         verdict = _verdict(count, limits)
         if step:
-            parts.append(f"{name} in steps of {step:.3g} {unit}, {count:.3g} of them in its usual range")
+            parts.append(f"step of the {name} {step:.3g} {unit}; its usual range is {count:.3g} steps")
         if verdict != "ok":
             remedies.append(f"a finer {name} signal or more {'travel' if name == 'position' else 'force'}")
             worst = verdict if worst != "fault" else worst

@@ -20,7 +20,7 @@ _WARNING = 0.002  # of the travel
 def _judge(view: View, evidence: Evidence) -> Finding:
     others = {name: values for name, values in view.even.extra.items() if name.endswith("position")}
     if not others or not view.moves:
-        why = "only one position was recorded: lost motion can't be told from friction that holds"
+        why = "only one position was recorded: lost motion can't be told from static friction"
         return Finding("sensor_side", "unknown", why, remedy="record the positions of motor and load")
     name, values = min(others.items())
     use = view.usable

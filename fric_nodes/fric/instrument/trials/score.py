@@ -15,7 +15,7 @@ from .ordinary import ordinary
 __all__ = ["LIMITS", "Alarms", "Hits", "clean_trial", "false_alarms", "hits", "ordinary_alarms"]
 
 LIMITS = frozenset({"direction", "excitation", "length", "resolution", "sampling", "sensor_side"})
-"""Checks whose warnings say what a recording can't show; no fault of it."""
+"""Checks whose warnings name a limit of the recording, which is no fault of it."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Hits:
 
 @dataclass(frozen=True)
 class Alarms:
-    """What checks said of clean recordings.
+    """Verdicts of the checks on clean recordings.
 
     Attributes:
         faults: found, with the seed of the recording; each is a false one.
@@ -100,7 +100,7 @@ def false_alarms(seeds: Sequence[int]) -> tuple[list[tuple[int, Finding]], Count
 
 
 def ordinary_alarms(seeds: Sequence[int]) -> Alarms:
-    """What checks say of ordinary recordings; with the model for every other seed."""
+    """Verdicts of the checks on ordinary recordings; with the model for every other seed."""
     faults: list[tuple[int, str]] = []
     warnings: Counter[str] = Counter()
     limits: Counter[str] = Counter()
