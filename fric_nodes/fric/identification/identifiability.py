@@ -5,8 +5,8 @@ column of J (:mod:`fric.identification.sensitivity`), and the noise is what the 
 
 - *Unseen*: even if all others were known, the standard error would be half the value or more.
 - *Coupled*: the recording determines only a combination. With columns scaled to unit length and J = U D V', the condition
-  indices are D_max/D_k; for each above a limit the parameters whose variance comes mostly from it (proportions V_jk^2/D_k^2) belong
-  together (Belsley, Kuh, Welsch 1980, section 3.2). Two columns with a correlation of 0.98 reach the limit.
+  indices are D_max/D_k; for each above a limit the parameters whose variance comes mostly from it (proportions V_jk^2/D_k^2)
+  belong together (Belsley, Kuh, Welsch 1980, section 3.2). Two columns with a correlation of 0.98 reach the limit.
 - *Instrument*: an error of an instrument would go unnoticed into the parameters
   (:mod:`fric.identification.instrument_errors`).
 

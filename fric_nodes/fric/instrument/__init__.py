@@ -25,7 +25,8 @@ def inspect(
 
     Args:
         records: recordings of one joint.
-        model: nominal model whose values are taken as right, for units and for friction that a drive compensates; None: not judged.
+        model: nominal model whose values are taken as right, for units and for friction that a drive compensates; None: not
+            judged.
         settings: known numbers: ``gear_ratio`` [1].
     """
     evidence = Evidence(tuple(records), model, dict(settings or {}))

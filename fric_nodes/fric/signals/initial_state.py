@@ -13,9 +13,9 @@ bias that this choice leaves, and its larger standard error covers it (Calonico,
 friction jumps within the window, no polynomial describes the motion; the change from parabola to cubic tells by how much it may
 be off, and the square of that is added to the variance.
 
-Errors of a coarse encoder aren't white: while its reading stays the same it gives no new information. s^2 is therefore multiplied by
-the mean number of samples for which a reading stays; of an axis that doesn't move by a step the velocity is known to one step
-per window.
+Errors of a coarse encoder aren't white: while its reading stays the same it gives no new information. s^2 is therefore
+multiplied by the mean number of samples for which a reading stays; of an axis that doesn't move by a step the velocity is
+known to one step per window.
 """
 
 from __future__ import annotations

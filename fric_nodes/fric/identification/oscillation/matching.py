@@ -2,10 +2,10 @@
 
 A transform maps a motion x to curves r(x) (amplitude, centre and phase over time), smooth in x but not what the averaged
 equations say of them. The estimate is the parameter vector p whose closed-form motion gives the reading nearest to the measured
-one, min |W (r(x(p)) - r(x measured))| (indirect inference, Gourieroux, Monfort, Renault 1993): whatever bias the ends of the window,
-the filter or the averaging have, both sides have it. With J = dr/dp and V the covariance of r under noise the covariance is
-(J'W'WJ)^-1 J'W'W V W'WJ (J'W'WJ)^-1. V comes from readings of the model's motion with noise drawn from what it leaves of the
-measured one: as large, and as correlated from one value to the next.
+one, min |W (r(x(p)) - r(x measured))| (indirect inference, Gourieroux, Monfort, Renault 1993): whatever bias the ends of the
+window, the filter or the averaging have, both sides have it. With J = dr/dp and V the covariance of r under noise the
+covariance is (J'W'WJ)^-1 J'W'W V W'WJ (J'W'WJ)^-1. V comes from readings of the model's motion with noise drawn from what it
+leaves of the measured one: as large, and as correlated from one value to the next.
 """
 
 from __future__ import annotations

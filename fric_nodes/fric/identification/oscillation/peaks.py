@@ -5,9 +5,10 @@ A single largest sample is biased by noise (it is the largest), by the sampling 
 
     x = X_n - a_s (1 - g_s(t - t_n)),   a_s = X_n + D_x + s x_k,
 
-with g of :mod:`.motion` and the direction s before and after. It is linear in X_n and in a_s of both sides. Four numbers (t_n, X_n
-and both a_s) are fitted to half a half cycle on either side. Only the shape g is taken from an estimate of frequency and damping; the amplitudes stay free,
-so that the peaks give information on friction of their own. Neighbouring windows don't overlap.
+with g of :mod:`.motion` and the direction s before and after. It is linear in X_n and in a_s of both sides. Four numbers (t_n,
+X_n and both a_s) are fitted to half a half cycle on either side. Only the shape g is taken from an estimate of frequency and
+damping; the amplitudes stay free, so that the peaks give information on friction of their own. Neighbouring windows don't
+overlap.
 
 The noise is one for all peaks: its variance, and how much more its correlation in time lets the estimates vary than white noise
 would, are means over the windows. A covariance from each window alone would weight the peaks by chance.

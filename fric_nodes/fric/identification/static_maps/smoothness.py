@@ -1,6 +1,7 @@
 """Whether what a friction curve leaves is scatter from run to run, or depends on the speed.
 
-Scatter is independent of the speed and of its neighbours. Two statistics of the weighted residuals r, per direction in order of speed:
+Scatter is independent of the speed and of its neighbours. Two statistics of the weighted residuals r, per direction in order
+of speed:
 
     R = sum (r_{k+1} - r_k)^2      (von Neumann's ratio, but for the variance): small where neighbours are alike;
     P = |sum r_k(+v) r_k(-v)|       large where both directions are alike, or opposite, at one speed.

@@ -1,7 +1,8 @@
 """Too short: fewer strokes and changes of speed than there are things to find.
 
 The value is the time in motion over the correlation time of the velocity, the time over which its autocorrelation falls to 1/e,
-summed over all recordings: the number of independent pieces of motion. A short recording is no fault of the instruments, hence a warning.
+summed over all recordings: the number of independent pieces of motion. A short recording is no fault of the instruments, hence
+a warning.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 With the position recorded s times too large, the mass seems s times too small, and the model's friction is to be taken at the
 true speed v/s; with the effort g times too large all forces are. The factor is estimated, and not picked from a list: log g
-is the mean of the estimates from mass and friction, each weighted by its variance (its standard error, and how well a model's value is
-known), with a 95 % interval. A known factor is named only where it lies inside that interval. Mass and friction have to
-agree; without a mass that shows, friction alone must be far off. Without a model, a reference tells the unit of the position
+is the mean of the estimates from mass and friction, each weighted by its variance (its standard error, and how well a model's
+value is known), with a 95 % interval. A known factor is named only where it lies inside that interval. Mass and friction have
+to agree; without a mass that shows, friction alone must be far off. Without a model, a reference tells the unit of the position
 relative to its own: the factor lies between the two regressions, of either signal on the other.
 """
 
