@@ -1,6 +1,6 @@
 """Benchmarks that a user can run with ``fric bench``: one file each, with a constant ``BENCHMARK``.
 
-Every figure of speed in the README comes from here.
+The figures of speed in the README and in docs/figures.md come from here.
 """
 
 from __future__ import annotations
