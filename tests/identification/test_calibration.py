@@ -85,5 +85,5 @@ def test_an_unknown_kind_or_method_is_refused() -> None:
     result = METHODS["inverse-dynamics"].fit(axis.start, records, Options())
     with pytest.raises(InputError, match="use one of sandwich, bootstrap, profile"):
         assess(result, records, Options(), "guess")
-    with pytest.raises(InputError, match="not to be had for the method 'hilbert'"):
+    with pytest.raises(InputError, match="not available for the method 'hilbert'"):
         assess(replace(result, method="hilbert"), records, Options(), "profile")

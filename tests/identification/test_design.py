@@ -176,7 +176,7 @@ def test_what_cannot_be_shown_is_said() -> None:
 
 
 def test_limits_that_nothing_keeps_are_refused() -> None:
-    with pytest.raises(DesignError, match="no excitation keeps the limits"):
+    with pytest.raises(DesignError, match="no excitation within the limits"):
         proposed(axis(), replace(LIMITS, force=(-5.0, 5.0)), kinds=ONE)
 
 
