@@ -130,7 +130,8 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
     rest_time = float(np.sum(~sliding)) * decimation / rate
     if rest_time > 0:
         notes.append(
-            f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) left out of sliding friction"
+            f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) are left out: "
+            "there the force doesn't show sliding friction"
         )
     clear = sliding & rests.clear(still)
     if rests.rounds:
