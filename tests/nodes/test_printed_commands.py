@@ -20,8 +20,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import fric
 import numpy as np
 import pytest
+from fric.bagio.read import read_record
+from fric.bagio.write import write_record
 
 if TYPE_CHECKING:
     from .conftest import Graph
@@ -81,20 +84,12 @@ def _map(folder: Path) -> None:
     mapping = next(block for language, block in _BLOCK.findall(text) if language == "yaml" and "# map.yaml" in block)
     (folder / "map.yaml").write_text(mapping, encoding="utf-8")
     gain = float(re.findall(r"scale: ([-+.\deE]+)", mapping)[0])
-    h, n = 1e-3, 12_000
-    t = h * np.arange(n)
-    reference = 0.05 * np.sin(2.0 * np.pi * 0.7 * t) + 0.02 * np.sin(2.0 * np.pi * 2.3 * t)
-    q = v = 0.0
-    rows = []
-    for k in range(n):
-        u = 2e4 * (reference[k] - q) - 300.0 * v
-        rows.append((t[k], 1e-6 * round(q / 1e-6), u / gain))
-        for _ in range(10):
-            free = v + 1e-4 / 5.0 * (u - 30.0 * v)
-            v = np.copysign(max(abs(free) - 1e-4 / 5.0 * 12.0, 0.0), free)
-            q += 1e-4 * v
-    lines = ["t,qm,vir", *(f"{a:.3f},{b:.6f},{c:.9g}" for a, b, c in rows)]
-    (folder / "run.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    t = 1e-3 * np.arange(12_000)
+    force = 60.0 * np.sin(2.0 * np.pi * (0.3 + 0.1 * t) * t)
+    axis = fric.build_model("rigid", {"mass": 5.0}, [fric.term("coulomb", force=12.0), fric.term("viscous", coefficient=30.0)])
+    position = fric.simulate(axis, force, 1e-3).position
+    table = np.column_stack([t, position.round(6), force / gain])
+    np.savetxt(folder / "run.csv", table, ["%.3f", "%.6f", "%.9g"], ",", header="t,qm,vir", comments="")
 
 
 def _found(folder: Path) -> None:
@@ -106,25 +101,14 @@ def _found(folder: Path) -> None:
 
 def _simulated(folder: Path) -> None:
     """``bags/simulated``: the recording with a little less force."""
-    from fric.bagio.read import read_record
-    from fric.bagio.write import write_record
-
     record = read_record(folder / "bags" / "slide")
     write_record(replace(record, effort=0.98 * record.effort), folder / "bags" / "simulated")
 
 
 def _followed(folder: Path) -> None:
     """``bags/my_run``: a recording with its reference."""
-    from fric.bagio.read import read_record
-    from fric.bagio.write import write_record
-
     record = read_record(folder / "bags" / "contour", end=4.0)
     write_record(replace(record, reference=record.position), folder / "bags" / "my_run")
-
-
-def _recorded(folder: Path) -> None:
-    """``bags/my_axis``, as the how-to records it."""
-    shutil.copytree(folder / "bags" / "slide", folder / "bags" / "my_axis")
 
 
 def _published(*names: str, under: str = "") -> Setup:
@@ -183,14 +167,20 @@ def _in_ci(*texts: str) -> Callable[[], bool]:
 
 
 def _by_tutorial() -> bool:
-    """True when the test of the examples walks through the tutorial, which needs its commands in their order."""
-    return "tutorial.md" in (ROOT / "tests" / "docs" / "test_examples.py").read_text(encoding="utf-8")
+    """True when the test of the examples walks through the tutorial, whose commands need each other in their order."""
+    return '_walk("docs/tutorial.md"' in (ROOT / "tests" / "docs" / "test_examples.py").read_text(encoding="utf-8")
 
 
 def _long(limit: float = 3600.0, **rest: object) -> Case:
     return Case(long=True, limit=limit, **rest)  # type: ignore[arg-type]
 
 
+_TUTORIAL = [
+    line
+    for language, block in _BLOCK.findall((ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"))
+    if language == "sh"
+    for line in _lines(block)
+]
 _IMPORT = "fric import run.csv --map map.yaml --out bags/run"
 _DESIGN = (
     "fric identify bags/slide --model config/start_model.yaml --method prediction-error --design --out found "
@@ -210,6 +200,7 @@ _SCREWS = (
 _TIAGO = "fric import tiago_effort.csv --map config/published/torso.yaml --repair --out bags/torso"
 
 KNOWN: dict[str, Case] = {
+    **dict.fromkeys(_TUTORIAL, Case(checked=_by_tutorial)),
     "python3 -m venv env && . env/bin/activate && pip install . && fric demo --out demo": Case(
         checked=_in_ci('-m venv "$work/env"', "pip install --quiet '.[test,docs]'")
     ),
@@ -217,21 +208,8 @@ KNOWN: dict[str, Case] = {
         checked=_in_ci("pip install --quiet '.[test,docs]'", "python -m pytest -n auto --dist worksteal")
     ),
     "sphinx-build -W --keep-going docs docs/_build": Case(checked=_in_ci("sphinx-build -q -W --keep-going docs")),
-    "fric record bags/my_axis --topic /joint_states --topic /effort_controller/commands": Case(node="recorder"),
-    "fric doctor bags/my_axis": Case((_recorded,)),
-    **{
-        command: Case(checked=_by_tutorial)
-        for command in (
-            "fric import axis.csv --map axis_map.yaml --out bags/axis",
-            "fric import check.csv --map axis_map.yaml --out bags/check",
-            "fric doctor bags/axis",
-            "fric identify bags/axis --validate bags/check --terms coulomb,viscous,bias --out found",
-            "fric diagnose bags/axis --validate bags/check --model found/model.yaml --out diagnosis",
-            "fric identify bags/axis --validate bags/check --terms coulomb,stribeck,viscous,bias --out richer",
-            "fric simulate richer/model.yaml --closed-loop pid.yaml --reference bags/check --out bags/pid_alone",
-            "fric simulate richer/model.yaml --closed-loop compensated.yaml --reference bags/check --out bags/compensated",
-        )
-    },
+    "fric record bags/my_run --topic /joint_states --topic /effort_controller/commands": Case(node="recorder"),
+    "fric doctor bags/my_run": Case((_followed,)),
     "colcon build && . install/setup.sh && ros2 run fric_nodes plant": Case(tool="colcon", long=True, node="plant"),
     _IMPORT: Case((_map,)),
     "fric identify bags/run --terms coulomb,viscous,bias,asymmetry --out found": Case((_after(_IMPORT),)),
@@ -241,8 +219,7 @@ KNOWN: dict[str, Case] = {
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml --out diagnosis": _long(),
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml": _long(),
     "fric diagnose bags/slide --blocks 8 --model config/nominal_model.yaml --out diagnosis": _long(),
-    "fric doctor bags/slide": Case(),
-    "fric doctor": Case(),
+    **dict.fromkeys(("fric doctor", "fric doctor bags/slide"), Case()),
     "fric compare bags/simulated bags/slide --out comparison": Case((_simulated,)),
     "fric model show found/model.yaml": Case((_found,)),
     "fric simulate found/model.yaml --force bags/slide --out bags/simulated": Case((_found,)),
@@ -273,15 +250,7 @@ KNOWN: dict[str, Case] = {
     },
     **{
         f"fric model {what}": Case()
-        for what in (
-            "effects",
-            "effects dwell_time",
-            "effects presliding",
-            "schema",
-            "plants",
-            "excitations",
-            "methods",
-        )
+        for what in ("effects", "effects dwell_time", "effects presliding", "plants", "excitations", "methods", "schema")
     },
     "fric verify --out verification.html": _long(7200.0),
     "fric demo": _long(),
