@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from fric.model import Model, build_model, term
 from fric.model_file import write_model
+from fric_nodes.convert import model_to_message, set_stamp
+from fric_nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.compensator import CompensatorNode
-from fric_nodes.nodes.convert import model_to_message, set_stamp
-from fric_nodes.nodes.lean_executor import LeanExecutor
-from fric_nodes.nodes.qos import MODEL
+from fric_nodes.qos import MODEL
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64

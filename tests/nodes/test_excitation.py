@@ -15,8 +15,8 @@ from fric.excitation.sequence import Sequence
 from fric.excitation_kind import ExcitationError
 from fric.model import build_model, term
 from fric.model_file import write_model
+from fric_nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.excitation import ExcitationNode
-from fric_nodes.nodes.lean_executor import LeanExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState

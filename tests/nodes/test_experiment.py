@@ -13,11 +13,11 @@ import pytest
 from fric.bagio import read_record
 from fric.experiment.motion import Drive, Sample
 from fric.model_file import read_model
-from fric_nodes.nodes.base import LOCK_STEP, LoopNode
+from fric_nodes.base import LOCK_STEP, LoopNode
+from fric_nodes.experiment_drive import ControllerDrive
+from fric_nodes.forces import STAMPED
+from fric_nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.experiment import ExperimentNode
-from fric_nodes.nodes.experiment_drive import ControllerDrive
-from fric_nodes.nodes.forces import STAMPED
-from fric_nodes.nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.pid import PidNode
 from fric_nodes.nodes.plant import PlantNode
 from rcl_interfaces.srv import SetParameters

@@ -13,7 +13,7 @@ from fric.identification.result import Options
 from fric.identification.start import start_model
 from fric.model_file import read_model
 from fric.record import Record, Units
-from fric_nodes.nodes.convert import model_from_message
+from fric_nodes.convert import model_from_message
 from fric_nodes.nodes.identifier import IdentifierNode
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile

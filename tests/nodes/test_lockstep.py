@@ -17,9 +17,9 @@ from fric.excitation import EXCITATIONS
 from fric.excitation.sequence import Sequence
 from fric.model import build_model, term
 from fric.model_file import write_model
+from fric_nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.compensator import CompensatorNode
 from fric_nodes.nodes.excitation import ExcitationNode
-from fric_nodes.nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.pid import PidNode
 from fric_nodes.nodes.plant import PlantNode
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor

@@ -15,8 +15,8 @@ from fric.excitation import EXCITATIONS
 from fric.excitation.sequence import Sequence
 from fric.model_file import read_model
 from fric.plants import PLANTS
+from fric_nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.excitation import ExcitationNode
-from fric_nodes.nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.plant import PlantNode
 from rclpy.node import Node
 from rclpy.parameter import Parameter

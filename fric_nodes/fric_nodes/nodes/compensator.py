@@ -14,14 +14,14 @@ from fric.model_file import read_model
 from fric_interfaces.msg import FrictionModel, Reference
 from fric_interfaces.srv import LoadModel
 
-from .base import LOCK_STEP, PERIOD, LoopNode
-from .convert import MessageError, model_from_message
-from .forces import STAMPED, ForcePublisher, ReferencePoint, reference_in
-from .lockstep import Answers
-from .main import run
-from .model_intake import ModelIntake
-from .parameters import NodeParameter
-from .qos import MODEL, SAMPLES
+from ..base import LOCK_STEP, PERIOD, LoopNode
+from ..convert import MessageError, model_from_message
+from ..forces import STAMPED, ForcePublisher, ReferencePoint, reference_in
+from ..lockstep import Answers
+from ..model_intake import ModelIntake
+from ..parameters import NodeParameter
+from ..qos import MODEL, SAMPLES
+from ..run import run
 
 __all__ = ["CompensatorNode", "main"]
 

@@ -19,12 +19,12 @@ from sensor_msgs.msg import JointState
 
 from fric_interfaces.msg import Reference
 
-from .base import LOCK_STEP, PERIOD, LoopNode, wall_clock
-from .convert import MessageError, from_seconds, joint_sample, nanoseconds, set_stamp
-from .forces import STAMPED, ForcePublisher
-from .main import run
-from .parameters import NodeParameter, from_declaration
-from .qos import SAMPLES
+from ..base import LOCK_STEP, PERIOD, LoopNode, wall_clock
+from ..convert import MessageError, from_seconds, joint_sample, nanoseconds, set_stamp
+from ..forces import STAMPED, ForcePublisher
+from ..parameters import NodeParameter, from_declaration
+from ..qos import SAMPLES
+from ..run import run
 
 __all__ = ["ExcitationNode", "main"]
 

@@ -22,15 +22,15 @@ from fric.experiment.settings import KINDS, NUMBERS, bounds_of, timing_of
 from fric.record import Units
 from sensor_msgs.msg import JointState
 
-from .base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent
-from .convert import JointSample, MessageError, joint_sample
-from .experiment_drive import ControllerDrive, ForceDrive, Output
-from .forces import STAMPED
-from .lean_executor import LeanExecutor
-from .orderly import OrderlyNode, run
-from .parameters import NodeParameter
-from .qos import SAMPLES
-from .scheduling import use_normal_scheduling
+from ..base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent
+from ..convert import JointSample, MessageError, joint_sample
+from ..experiment_drive import ControllerDrive, ForceDrive, Output
+from ..forces import STAMPED
+from ..lean_executor import LeanExecutor
+from ..orderly import OrderlyNode, run
+from ..parameters import NodeParameter
+from ..qos import SAMPLES
+from ..scheduling import use_normal_scheduling
 
 __all__ = ["ExperimentNode", "main"]
 

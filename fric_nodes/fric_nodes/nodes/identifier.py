@@ -17,6 +17,7 @@ from fric.identification.start import start_model
 from fric.model import Model
 from fric.model_file import read_model, write_model
 from fric.record import Units
+from fric.signals.sample_pairs import EffortPairing, Sample
 from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
@@ -24,13 +25,12 @@ from sensor_msgs.msg import JointState
 from fric_interfaces.msg import FrictionEstimate, FrictionModel
 from fric_interfaces.srv import FreezeIdentification, ResetIdentification, SaveIdentification, StartIdentification
 
-from .bulk import BulkSubscription
-from .convert import MessageError, joint_sample, model_to_message
-from .estimates import estimate_to_message, well_determined
-from .orderly import OrderlyNode, run
-from .parameters import NodeParameter, Settings
-from .qos import DIAGNOSTICS, MODEL, SAMPLES
-from .sample_pairs import EffortPairing, Sample
+from ..bulk import BulkSubscription
+from ..convert import MessageError, joint_sample, model_to_message
+from ..estimates import estimate_to_message, well_determined
+from ..orderly import OrderlyNode, run
+from ..parameters import NodeParameter, Settings
+from ..qos import DIAGNOSTICS, MODEL, SAMPLES
 
 __all__ = ["PARAMETERS", "IdentifierNode", "main"]
 

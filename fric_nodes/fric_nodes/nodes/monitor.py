@@ -22,6 +22,7 @@ from fric.diagnosis.watch import Phase, Watch, WatchSettings
 from fric.model_file import model_from_text, model_to_text, read_model
 from fric.record import Record
 from fric.shared_files import config_file
+from fric.signals.sample_pairs import EffortPairing, Sample
 from fric.threads import end_with_parent
 from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
@@ -29,12 +30,11 @@ from sensor_msgs.msg import JointState
 
 from fric_interfaces.msg import Mismatch
 
-from .bulk import BulkSubscription
-from .convert import MessageError, joint_sample, set_stamp
-from .orderly import OrderlyNode, run
-from .parameters import NodeParameter, Settings
-from .qos import DIAGNOSTICS, MODEL, SAMPLES
-from .sample_pairs import EffortPairing, Sample
+from ..bulk import BulkSubscription
+from ..convert import MessageError, joint_sample, set_stamp
+from ..orderly import OrderlyNode, run
+from ..parameters import NodeParameter, Settings
+from ..qos import DIAGNOSTICS, MODEL, SAMPLES
 
 __all__ = ["PARAMETERS", "MonitorNode", "main"]
 

@@ -17,13 +17,13 @@ from std_msgs.msg import Float64
 
 from fric_interfaces.msg import Reference, StampedForce
 
-from .base import LOCK_STEP, PERIOD, LoopNode
-from .convert import JointSample, MessageError, from_seconds, joint_sample
-from .forces import STAMPED, ForcePublisher, ReferencePoint, force_in, force_type, reference_in
-from .lockstep import Stream
-from .main import run
-from .parameters import NodeParameter
-from .qos import SAMPLES
+from ..base import LOCK_STEP, PERIOD, LoopNode
+from ..convert import JointSample, MessageError, from_seconds, joint_sample
+from ..forces import STAMPED, ForcePublisher, ReferencePoint, force_in, force_type, reference_in
+from ..lockstep import Stream
+from ..parameters import NodeParameter
+from ..qos import SAMPLES
+from ..run import run
 
 __all__ = ["PidNode", "main"]
 

@@ -26,13 +26,13 @@ from std_msgs.msg import Float64
 
 from fric_interfaces.msg import StampedForce
 
-from .base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent, wall_clock
-from .convert import MessageError, from_seconds, set_stamp
-from .forces import STAMPED, ForcePublisher, force_in, force_type
-from .lockstep import Stream
-from .main import run
-from .parameters import NodeParameter
-from .qos import SAMPLES
+from ..base import LOCK_STEP, PERIOD, LoopNode, wait_until_sent, wall_clock
+from ..convert import MessageError, from_seconds, set_stamp
+from ..forces import STAMPED, ForcePublisher, force_in, force_type
+from ..lockstep import Stream
+from ..parameters import NodeParameter
+from ..qos import SAMPLES
+from ..run import run
 
 __all__ = ["PlantNode", "main"]
 

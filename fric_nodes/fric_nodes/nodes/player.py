@@ -9,6 +9,7 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from fric.bagio.errors import BagError
+from fric.bagio.playback import Due, Pace, recorded_qos, schedule
 from fric.bagio.read import bag_info, iterate_raw
 from fric.errors import InputError
 from rclpy.publisher import Publisher
@@ -16,11 +17,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Qos
 from rosgraph_msgs.msg import Clock
 
-from .base import wait_until_sent
-from .bulk import message_class
-from .orderly import OrderlyNode, run
-from .parameters import NodeParameter, NodeParameterError, Settings
-from .playback import Due, Pace, recorded_qos, schedule
+from ..base import wait_until_sent
+from ..bulk import message_class
+from ..orderly import OrderlyNode, run
+from ..parameters import NodeParameter, NodeParameterError, Settings
 
 __all__ = ["PARAMETERS", "NoSubscribersError", "PlayerNode", "main"]
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from fric.bagio.errors import WriteError
+from fric.bagio.message_order import ReceiveOrder, StampOrder, TopicIntake
 from fric.bagio.padding import PaddingEraser
 from fric.bagio.types import type_fields
 from fric.bagio.write import BagWriter
@@ -17,11 +18,10 @@ from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from .bulk import BulkSubscription, message_class, offered_qos
-from .message_order import ReceiveOrder, StampOrder, TopicIntake
-from .orderly import OrderlyNode, run
-from .parameters import NodeParameter, NodeParameterError, Settings
-from .qos import DIAGNOSTICS
+from ..bulk import BulkSubscription, message_class, offered_qos
+from ..orderly import OrderlyNode, run
+from ..parameters import NodeParameter, NodeParameterError, Settings
+from ..qos import DIAGNOSTICS
 
 __all__ = ["DEFAULT_TOPICS", "PARAMETERS", "RecorderNode", "main"]
 
