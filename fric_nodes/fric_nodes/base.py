@@ -1,105 +1,104 @@
-"""What every node of the loop has: declared parameters, counters, deadlines, and a report of them on ``/diagnostics``."""
+"""The one base class of all nodes: declared parameters, counters, refusals, and reports on ``/diagnostics``."""
 
 from __future__ import annotations
 
-import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, TypeVar
 
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.task import Future
 
+from .convert import MessageError
 from .parameters import NodeParameter, Settings
-from .scheduling import use_realtime_scheduling
 from .timing import Deadlines, Reporter
 
-__all__ = ["COMMON", "LOCK_STEP", "PERIOD", "LoopNode", "wait_until_sent", "wall_clock"]
+__all__ = ["FricNode", "wait_until_sent"]
 
-PERIOD = NodeParameter("period", 0.002, "sample period of the loop", "s", 1e-5, 10.0)
-LOCK_STEP = NodeParameter("lock_step", False, "count samples instead of time: the plant waits for the command to each sample")
-COMMON = (
-    NodeParameter("joint", "axis", "name of the joint in joint states and models"),
-    NodeParameter(
-        "realtime_priority", 0, "wall time: SCHED_FIFO priority to ask the system for; 0: normal scheduling", "", 0, 99
-    ),
-    NodeParameter("wait_for_subscribers", 1, "publish the first sample when so many listen; later ones always", "", 0, 100),
-    NodeParameter("diagnostics_period", 1.0, "time between two reports on /diagnostics", "s", 0.01, 3600.0),
-)
+Message = TypeVar("Message")
+Value = TypeVar("Value")
 
 
-class LoopNode(Node):
-    """A node with declared parameters that reports on itself.
+class FricNode(Node):
+    """A node with declared parameters that :func:`fric_nodes.run.run` serves.
 
     Args:
         name: of the node.
-        declarations: its parameters besides the common ones.
+        declarations: its parameters.
         options: ``context``, ``namespace``, ``parameter_overrides`` and the like, as for ``rclpy.node.Node``.
 
     Attributes:
+        executor_kind: what makes the executor that serves the node in a process of its own.
         settings: values of the parameters.
         counters: what was counted, by name.
-        deadlines: periods of the node's main activity.
-        finished: done when the node has nothing more to do, so that its process ends.
+        deadlines: periods of the node's main activity; without a nominal period unless the node gives one.
 
     Raises:
         NodeParameterError: a parameter has a value that can't be used.
     """
 
+    executor_kind: ClassVar[Callable[[], Executor]] = SingleThreadedExecutor
+
     def __init__(self, name: str, declarations: Sequence[NodeParameter], **options: Any) -> None:
         super().__init__(name, **options)
-        self.settings = Settings(self, (*COMMON, *declarations))
+        self.settings = Settings(self, declarations)
         self.counters: Counter[str] = Counter()
-        self.joint = self.settings.text("joint")
-        self.lock_step = LOCK_STEP in declarations and self.settings.flag("lock_step")
-        self.period = self.settings.number("period") if PERIOD in declarations else 0.0
-        self.deadlines = Deadlines(0.0 if self.lock_step else self.period)
-        self.finished: Future = Future()
-        self._scheduling = "normal"
-        self._heard = False
-        self._reporter = Reporter(
-            self, self.settings.number("diagnostics_period"), self.deadlines, self.counters, self._all_conditions
-        )
+        self.deadlines = Deadlines(0.0)
+        # Timers count on this clock: the node's own may be simulated, and stand still.
+        self.steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._finished = False
 
-    def settle(self) -> None:
-        """Called once before the loop starts, by a process that the node has for itself."""
-        priority = self.settings.integer("realtime_priority")
-        if priority > 0 and not self.lock_step:
-            self._scheduling = use_realtime_scheduling(priority)
-            self.get_logger().info(f"scheduling: {self._scheduling}")
+    # What a node may override
 
-    def _all_conditions(self) -> Mapping[str, str]:
-        return {"scheduling": self._scheduling, **self.condition()}
+    def begin(self) -> None:
+        """Called once before the node is served, in a process that it has for itself."""
 
-    def condition(self) -> Mapping[str, str]:
-        """What the node adds to its report; overridden where there is something."""
+    def condition(self) -> Mapping[str, object]:
+        """What the node adds to its report."""
         return {}
 
-    def has_audience(self, publisher: Publisher) -> bool:
-        """True once as many nodes as asked for listen to ``publisher``, and from then on."""
-        if not self._heard:
-            self._heard = bool(publisher.get_subscription_count() >= self.settings.integer("wait_for_subscribers"))
-        return self._heard
+    def verdict(self, troubles: Sequence[str]) -> tuple[bytes, str]:
+        """Level and text of the report; ``troubles`` are the refusals and missed deadlines since the last one."""
+        return DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK, ", ".join(troubles) or "running"
+
+    @property
+    def done(self) -> bool:
+        """True when the node has nothing more to do, so that its process ends."""
+        return self._finished
+
+    def close(self) -> None:
+        """Finish what has been begun; called before the node is destroyed, while the graph still works.
+
+        Raises:
+            InputError: the work failed.
+        """
+
+    # What a node may use
+
+    def finish(self) -> None:
+        """Let the process end with status 0."""
+        self._finished = True
+
+    def report_every(self, period: float) -> Reporter:
+        """Report on ``/diagnostics`` every ``period`` [s] from now on."""
+        return Reporter(self, period, self.deadlines, self.counters, self.verdict, self.condition)
 
     def refuse(self, what: str, why: object) -> None:
         """Count an input that can't be used, and say so at most once a second."""
         self.counters[f"refused {what}"] += 1
         self.get_logger().warning(f"refused {what}: {why}", throttle_duration_sec=1.0)
 
-    def finish(self) -> None:
-        """Let the process end with status 0."""
-        if not self.finished.done():
-            self.finished.set_result(None)
-
-    def close(self) -> None:
-        """Called before the node is destroyed; overridden where something is to be closed."""
-
-
-def wall_clock() -> tuple[int, int]:
-    """Time since 1970 and monotonic time of one instant [ns]: stamps count on from here, free of clock corrections."""
-    return time.time_ns(), time.monotonic_ns()
+    def usable(self, what: str, read: Callable[[Message], Value], message: Message) -> Value | None:
+        """What ``read`` makes of ``message``; None, and a refusal of ``what``, when it can't be used."""
+        try:
+            return read(message)
+        except MessageError as error:
+            self.refuse(what, error)
+            return None
 
 
 def wait_until_sent(node: Node, publisher: Publisher, seconds: float) -> None:

@@ -182,7 +182,7 @@ def test_bad_messages_are_counted_and_survived(graph: Any) -> None:
         JointState(),
     ):
         publisher.publish(bad)
-    graph.until(lambda: node.counters["refused: joint state"] == 5, "five refusals")
+    graph.until(lambda: node.counters["refused joint state"] == 5, "five refusals")
     good = JointState(name=["axis"], position=[0.0], velocity=[], effort=[0.0])
     for k in range(1, 1001):
         good.header.stamp.nanosec = k * 900_000
