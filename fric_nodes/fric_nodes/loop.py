@@ -48,8 +48,8 @@ class LoopNode(FricNode):
         NodeParameterError: a parameter has a value that can't be used.
     """
 
-    # `fric bench lock-step` is several times as fast with it as with the SingleThreadedExecutor, which collects all entities for
-    # every wait anew and wraps each callback into a task.
+    # `fric bench lock-step` is several times as fast with it as with the SingleThreadedExecutor, which collects all entities
+    # for every wait anew and wraps each callback into a task.
     executor_kind: ClassVar[Callable[[], Executor]] = staticmethod(EventsExecutor)
 
     def __init__(self, name: str, declarations: Sequence[NodeParameter], **options: Any) -> None:
