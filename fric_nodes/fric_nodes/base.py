@@ -85,7 +85,12 @@ class FricNode(Node):
 
     def report_every(self, period: float) -> Reporter:
         """Report on ``/diagnostics`` every ``period`` [s] from now on."""
-        return Reporter(self, period, self.deadlines, self.counters, self.verdict, self.condition)
+        self._reporter = Reporter(self, period, self.deadlines, self.counters, self.verdict, self.condition)
+        return self._reporter
+
+    def report(self) -> None:
+        """Report now, besides."""
+        self._reporter.publish()
 
     def refuse(self, what: str, why: object) -> None:
         """Count an input that can't be used, and say so at most once a second."""

@@ -60,8 +60,8 @@ class LoopNode(FricNode):
         self.deadlines = Deadlines(0.0 if self.lock_step else self.period)
         self._scheduling = "normal"
         self._heard = False
-        self._reporter = self.report_every(self.settings.number("diagnostics_period"))
-        self._reporter.more = lambda: {"scheduling": self._scheduling, **self.condition()}
+        reporter = self.report_every(self.settings.number("diagnostics_period"))
+        reporter.more = lambda: {"scheduling": self._scheduling, **self.condition()}
 
     def begin(self) -> None:
         """Ask for real-time scheduling, where it is wanted."""
