@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
@@ -32,7 +32,6 @@ class FricNode(Node):
         options: ``context``, ``namespace``, ``parameter_overrides`` and the like, as for ``rclpy.node.Node``.
 
     Attributes:
-        executor_kind: what makes the executor that serves the node in a process of its own.
         settings: values of the parameters.
         counters: what was counted, by name.
         deadlines: periods of the node's main activity; without a nominal period unless the node gives one.
@@ -40,8 +39,6 @@ class FricNode(Node):
     Raises:
         NodeParameterError: a parameter has a value that can't be used.
     """
-
-    executor_kind: ClassVar[Callable[[], Executor]] = SingleThreadedExecutor
 
     def __init__(self, name: str, declarations: Sequence[NodeParameter], **options: Any) -> None:
         super().__init__(name, **options)
@@ -53,6 +50,11 @@ class FricNode(Node):
         self._finished = False
 
     # What a node may override
+
+    @staticmethod
+    def make_executor() -> Executor:
+        """The executor that serves the node in a process of its own."""
+        return SingleThreadedExecutor()
 
     def begin(self) -> None:
         """Called once before the node is served, in a process that it has for itself."""

@@ -49,7 +49,8 @@ class ModelIntake:
         self._ready: deque[_Prepared] = deque()
         node.create_timer(0.05, self._hand_over)
         node.create_subscription(FrictionModel, "friction/model", self._on_model, MODEL)
-        service: Any = node.create_service(LoadModel, "~/load_model", lambda request, response: (request, response))
+        pair: Any = lambda request, response: (request, response)  # noqa: E731
+        service: Any = node.create_service(LoadModel, "~/load_model", pair)
         self._send, service.send_response = service.send_response, self._answer
 
     def _on_model(self, message: FrictionModel) -> None:

@@ -71,7 +71,7 @@ def run(kind: Callable[..., FricNode], args: list[str] | None = None) -> None:
 
 
 def _serve(node: FricNode, stop: _Stop) -> None:
-    executor = node.executor_kind()
+    executor = node.make_executor()
     with ExitStack() as ending:
         ending.callback(node.destroy_node)
         ending.callback(executor.shutdown)
