@@ -122,7 +122,7 @@ def _interfaces() -> Item:
 
 
 def _round_trip() -> Item:
-    return round_trip_item(importlib.import_module("fric_nodes.nodes.round_trip").round_trip())
+    return round_trip_item(importlib.import_module("fric_nodes.round_trip").round_trip())
 
 
 def round_trip_item(seconds: float | None) -> Item:

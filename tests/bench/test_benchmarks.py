@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from fric.bench import BENCHMARKS, Benchmark
-from fric.bench.benchmark import Figure
 from fric.bench.by_scipy import fit_by_scipy
+from fric.figure import Figure
 from fric.record import Record
 from fric_nodes.cli import bench
 from typer import Typer

@@ -367,12 +367,6 @@ def test_it_is_found_by_name(effect: Effect) -> None:
     assert by_name(effect.id, "no such law") is None
 
 
-def test_the_law_without_a_name() -> None:
-    stribeck = by_name("stribeck")
-    assert stribeck is not None
-    assert stribeck.law == "exponential"
-
-
 def crowds() -> list[list[Effect]]:
     """All effects in as few models as hold them: no two laws of one effect in the same."""
     found: list[list[Effect]] = []

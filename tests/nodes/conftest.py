@@ -25,6 +25,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
 NodeT = TypeVar("NodeT", bound=Node)
@@ -71,7 +72,7 @@ class Graph:
         """What lets the plant's model be exchanged while it runs."""
         return ModelChange(self, node)
 
-    def spin(self, *nodes: Node, kind: type[Executor] = SingleThreadedExecutor) -> None:
+    def spin(self, *nodes: Node, kind: Callable[..., Executor] = SingleThreadedExecutor) -> None:
         """Serve ``nodes`` from a thread until the test ends."""
         executor = kind(context=nodes[0].context)
         for node in nodes:
@@ -80,7 +81,11 @@ class Graph:
         def work() -> None:
             try:
                 with contextlib.suppress(ExternalShutdownException):
-                    executor.spin()
+                    # Without a limit of its own the events executor of rclpy 7.1 waits for ever.
+                    while kind is EventsExecutor and not self._closing:
+                        executor.spin_once(timeout_sec=0.1)
+                    if kind is not EventsExecutor:
+                        executor.spin()
             except AttributeError:
                 # rclpy's shutdown may take the guards away while the last wait is being set up.
                 if not self._closing:

@@ -6,9 +6,9 @@ import math
 
 import pytest
 from fric.model import ModelError, build_model, term
-from fric_nodes.nodes.convert import MessageError, joint_sample, model_from_message, model_to_message, nanoseconds, set_stamp
-from fric_nodes.nodes.lockstep import Answers, Stream
-from fric_nodes.nodes.timing import Deadlines
+from fric_nodes.convert import MessageError, joint_sample, model_from_message, model_to_message, nanoseconds, set_stamp
+from fric_nodes.lockstep import Answers, Stream
+from fric_nodes.timing import Deadlines
 from sensor_msgs.msg import JointState
 
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from fric.model import Model, build_model, term
 from fric.model_file import write_model
+from fric_nodes.convert import model_to_message, set_stamp
 from fric_nodes.nodes.compensator import CompensatorNode
-from fric_nodes.nodes.convert import model_to_message, set_stamp
-from fric_nodes.nodes.lean_executor import LeanExecutor
-from fric_nodes.nodes.qos import MODEL
+from fric_nodes.qos import MODEL
 from rcl_interfaces.srv import SetParameters
+from rclpy.experimental import EventsExecutor
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
 
@@ -35,7 +35,7 @@ class Bench:
     def __init__(self, graph: Graph, **parameters: object) -> None:
         overrides = [Parameter(key, value=value) for key, value in {"period": H, "transition_time": 0.2, **parameters}.items()]
         self.compensator = graph.owns(CompensatorNode(context=graph.context(), parameter_overrides=overrides))
-        graph.spin(self.compensator, kind=LeanExecutor)
+        graph.spin(self.compensator, kind=EventsExecutor)
         self.graph, self.forces, self._k = graph, [], 0
         self.node = graph.node("bench")
         self.node.create_subscription(Float64, "feedforward_force", lambda m: self.forces.append(m.data), 1000)

@@ -16,7 +16,7 @@ from fric.excitation_kind import ExcitationError
 from fric.model import build_model, term
 from fric.model_file import write_model
 from fric_nodes.nodes.excitation import ExcitationNode
-from fric_nodes.nodes.lean_executor import LeanExecutor
+from rclpy.experimental import EventsExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
@@ -93,7 +93,7 @@ def test_in_lock_step_the_answers_are_those_of_the_core(graph: Graph) -> None:
     node = graph.node("listener")
     node.create_subscription(StampedForce, "force_command", lambda m: said.__setitem__(_sample(m), m.force), DEEP)
     node.create_subscription(JointState, "joint_states", lambda m: seen.__setitem__(_sample(m), m.position[0]), DEEP)
-    graph.spin(node, kind=LeanExecutor)
+    graph.spin(node, kind=EventsExecutor)
     values = {key: f"[{','.join(value)}]" if isinstance(value, list) else value for key, value in _parameters().items()}
     excitation = graph.start_node("excitation", lock_step=True, period=H, wait_for_subscribers=2, **values)
     file = _write(graph.folder)
@@ -115,7 +115,7 @@ def test_in_wall_time_an_axis_oscillates(graph: Graph) -> None:
     positions: list[float] = []
     node = graph.node("listener")
     node.create_subscription(JointState, "joint_states", lambda m: positions.append(m.position[0]), DEEP)
-    graph.spin(node, kind=LeanExecutor)
+    graph.spin(node, kind=EventsExecutor)
     values = {key: f"[{','.join(value)}]" if isinstance(value, list) else value for key, value in _parameters().items()}
     # Long enough for many more crossings than are asked for, whatever the machine does meanwhile.
     values["parametric_oscillation.oscillation_time"] = 2.0
@@ -138,8 +138,8 @@ def test_states_that_cannot_be_used_are_refused_and_counted(graph: Graph) -> Non
 
     node.create_subscription(Float64, "force_command", lambda m: forces.append(m.data), DEEP)
     publisher = node.create_publisher(JointState, "joint_states", 100)
-    graph.spin(node, kind=LeanExecutor)
-    graph.spin(excitation, kind=LeanExecutor)
+    graph.spin(node, kind=EventsExecutor)
+    graph.spin(excitation, kind=EventsExecutor)
     graph.meet(node, excitation)
 
     def send(stamp: int, **fields: object) -> None:
@@ -170,9 +170,9 @@ def test_a_recorded_motion_is_chosen_by_a_text(graph: Graph) -> None:
     references: list[Reference] = []
     node = graph.node("listener")
     node.create_subscription(Reference, "reference", references.append, DEEP)
-    graph.spin(node, kind=LeanExecutor)
+    graph.spin(node, kind=EventsExecutor)
     values = {"kinds": ["recorded"], "recorded.file": str(graph.folder / "motion.csv"), "recorded.lead_time": 0.05}
-    graph.spin(_node(graph, **values, start_delay=0.0, period=0.005), kind=LeanExecutor)
+    graph.spin(_node(graph, **values, start_delay=0.0, period=0.005), kind=EventsExecutor)
     graph.until(lambda: len(references) > 100, "references arrive")
     q = np.array([m.position for m in references])
     start = references[0].header.stamp

@@ -13,15 +13,15 @@ import pytest
 from fric.bagio import read_record
 from fric.experiment.motion import Drive, Sample
 from fric.model_file import read_model
-from fric_nodes.nodes.base import LOCK_STEP, LoopNode
+from fric_nodes.experiment_drive import ControllerDrive
+from fric_nodes.forces import STAMPED
+from fric_nodes.loop import LOCK_STEP, LoopNode
 from fric_nodes.nodes.experiment import ExperimentNode
-from fric_nodes.nodes.experiment_drive import ControllerDrive
-from fric_nodes.nodes.forces import STAMPED
-from fric_nodes.nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.pid import PidNode
 from fric_nodes.nodes.plant import PlantNode
 from rcl_interfaces.srv import SetParameters
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
@@ -92,7 +92,7 @@ class Hearer:
         self.forces: list[float] = []
         field = "data" if kind is Float64 else "force"
         self.node.create_subscription(kind, "force_command", lambda m: self.forces.append(getattr(m, field)), DEEP)
-        graph.spin(self.node, kind=LeanExecutor)
+        graph.spin(self.node, kind=EventsExecutor)
 
 
 @pytest.mark.long
@@ -113,7 +113,7 @@ def test_processes_in_lock_step_find_the_axis(graph: Graph) -> None:
     assert (out / "report.html").read_text(encoding="utf-8").startswith("<!")
 
 
-@pytest.mark.parametrize("kind", [SingleThreadedExecutor, MultiThreadedExecutor, LeanExecutor])
+@pytest.mark.parametrize("kind", [SingleThreadedExecutor, MultiThreadedExecutor, EventsExecutor])
 def test_every_executor_gives_the_same_run(graph: Graph, kind: type[Executor], quick_switches: None) -> None:
     context = graph.context()
     plant = graph.owns(PlantNode(context=context, parameter_overrides=_overrides(**_plant(graph.folder))))
@@ -135,7 +135,7 @@ def test_the_gains_of_a_controller_are_set(graph: Graph) -> None:
     pid = graph.owns(PidNode(context=context, parameter_overrides=_overrides(lock_step=True, period=H, force_limit=5.0)))
     few = {**QUICK, "lock_step": True, "out": str(out), "controller": "pid", "fewest_runs": 2, "most_runs": 2}
     node = graph.owns(ExperimentNode(context=context, parameter_overrides=_overrides(**few)))
-    graph.spin(plant, pid, node, kind=LeanExecutor)
+    graph.spin(plant, pid, node, kind=EventsExecutor)
     graph.until(lambda: node.done, "the experiment ends", 240.0)
     runs = json.loads((out / "experiment.json").read_text())["runs"]
     assert [run["problem"] for run in runs] == ["", ""]
@@ -160,7 +160,7 @@ def test_a_controller_that_is_begun_anew_before_it_answered_is_asked_again(graph
     gone.destroy_node()
     graph.until(lambda: not client.service_is_ready(), "it is gone")
     pid = graph.owns(PidNode(context=context, parameter_overrides=_overrides(lock_step=True, period=H, force_limit=5.0)))
-    graph.spin(pid, asker, kind=LeanExecutor)
+    graph.spin(pid, asker, kind=EventsExecutor)
     graph.until(lambda: drive.give(2, wanted, sample) is not None, "the setting is made", 30.0)
     assert pid.settings.number("kp") == 2.0
 
@@ -205,7 +205,7 @@ def test_an_axis_that_runs_away_is_cut_with_one_message(graph: Graph) -> None:
 
     plant.create_subscription(StampedForce, "force_command", on_command, DEEP)
     plant.create_timer(0.2, lambda: publisher.publish(state(len(sent))))
-    graph.spin(plant, node, kind=LeanExecutor)
+    graph.spin(plant, node, kind=EventsExecutor)
     graph.until(lambda: node.done, "the experiment ends", 240.0)
     messages = json.loads((out / "experiment.json").read_text())["messages"]
     assert sum("the force is cut" in message for message in messages) == 1
@@ -235,7 +235,7 @@ def test_states_that_are_not_finite_are_never_answered_with_a_force(graph: Graph
     node = graph.owns(ExperimentNode(context=context, parameter_overrides=_overrides(**few)))
     plant = graph.node("plant")
     publisher = plant.create_publisher(JointState, "joint_states", DEEP)
-    graph.spin(node, kind=LeanExecutor)
+    graph.spin(node, kind=EventsExecutor)
     graph.meet(plant, hearer.node, node)
     for number in range(400):
         bad = number % 10 == 5

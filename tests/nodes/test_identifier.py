@@ -13,7 +13,7 @@ from fric.identification.result import Options
 from fric.identification.start import start_model
 from fric.model_file import read_model
 from fric.record import Record, Units
-from fric_nodes.nodes.convert import model_from_message
+from fric_nodes.convert import model_from_message
 from fric_nodes.nodes.identifier import IdentifierNode
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -182,7 +182,7 @@ def test_bad_messages_are_counted_and_survived(graph: Any) -> None:
         JointState(),
     ):
         publisher.publish(bad)
-    graph.until(lambda: node.counters["refused: joint state"] == 5, "five refusals")
+    graph.until(lambda: node.counters["refused joint state"] == 5, "five refusals")
     good = JointState(name=["axis"], position=[0.0], velocity=[], effort=[0.0])
     for k in range(1, 1001):
         good.header.stamp.nanosec = k * 900_000

@@ -103,7 +103,7 @@ def machine(graph: Any) -> Iterator[Any]:
 
     yield make
     for each in made:
-        each.monitor.release()
+        each.monitor.close()
 
 
 def stamp(message: Mismatch) -> float:
@@ -175,7 +175,7 @@ def test_bad_messages_are_counted_and_survived(machine: Any) -> None:
         JointState(),
     ):
         publisher.publish(bad)
-    rig.until(lambda: rig.monitor.counters["refused: joint state"] == 5, "five refusals")
+    rig.until(lambda: rig.monitor.counters["refused joint state"] == 5, "five refusals")
     good = JointState(name=["axis"], position=[0.0], effort=[0.0])
     for k in range(1, 1001):
         good.header.stamp.sec, good.header.stamp.nanosec = divmod(k * 2_000_000, 1_000_000_000)

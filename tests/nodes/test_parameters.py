@@ -9,9 +9,9 @@ import pytest
 from fric.excitation import EXCITATIONS
 from fric_nodes.nodes.compensator import CompensatorNode
 from fric_nodes.nodes.excitation import ExcitationNode
-from fric_nodes.nodes.parameters import NodeParameter, NodeParameterError, Settings
 from fric_nodes.nodes.pid import PidNode
 from fric_nodes.nodes.plant import PlantNode
+from fric_nodes.parameters import NodeParameter, NodeParameterError, Settings
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 

@@ -12,7 +12,8 @@ import pytest
 from fric.bagio import BagWriter, iterate_raw, write_record
 from fric.bagio.errors import BagError
 from fric.record import Record
-from fric_nodes.nodes.player import NoSubscribersError, PlayerNode
+from fric_nodes.bag_publishers import NoSubscribersError
+from fric_nodes.nodes.player import PlayerNode
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy

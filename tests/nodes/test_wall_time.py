@@ -16,10 +16,10 @@ from fric.model import build_model, term
 from fric.model_file import write_model
 from fric_nodes.nodes.compensator import CompensatorNode
 from fric_nodes.nodes.excitation import ExcitationNode
-from fric_nodes.nodes.lean_executor import LeanExecutor
 from fric_nodes.nodes.pid import PidNode
 from fric_nodes.nodes.plant import PlantNode
 from rclpy.executors import Executor, MultiThreadedExecutor
+from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
@@ -66,7 +66,7 @@ class Listener:
         subscribe(Float64, "force_command", lambda m: self.commands.append(m.data), DEEP)
         subscribe(DiagnosticArray, "/diagnostics", self._on_report, 10)
         self.forces = self.node.create_publisher(Float64, "force_command", 10)
-        graph.spin(self.node, kind=LeanExecutor)
+        graph.spin(self.node, kind=EventsExecutor)
 
     def _on_state(self, message: JointState) -> None:
         if message.position and message.effort:
@@ -95,7 +95,7 @@ def _seconds(message: Any) -> float:
 
 
 @pytest.mark.usefixtures("quick_switches")
-@pytest.mark.parametrize("kind", [MultiThreadedExecutor, LeanExecutor])
+@pytest.mark.parametrize("kind", [MultiThreadedExecutor, EventsExecutor])
 def test_loop_follows_the_reference_in_one_process(graph: Graph, kind: type[Executor]) -> None:
     listener = Listener(graph)
     context = graph.context()
@@ -136,7 +136,7 @@ def test_processes_come_and_go(graph: Graph) -> None:
 def test_without_commands_the_force_is_zero_within_the_watchdog_time(graph: Graph) -> None:
     listener = Listener(graph)
     plant = _make(graph, PlantNode, model_file=_model_file(graph.folder), watchdog_time=0.1, diagnostics_period=0.1)
-    graph.spin(plant, kind=LeanExecutor)
+    graph.spin(plant, kind=EventsExecutor)
     graph.meet(listener.node, plant)
     graph.until(lambda: listener.states, "the plant is there")
     listener.forces.publish(Float64(data=3.0))
@@ -155,7 +155,7 @@ def test_without_commands_the_force_is_zero_within_the_watchdog_time(graph: Grap
 def test_commands_that_are_not_finite_are_refused_counted_and_reported(graph: Graph) -> None:
     listener = Listener(graph)
     plant = _make(graph, PlantNode, model_file=_model_file(graph.folder), diagnostics_period=0.1)
-    graph.spin(plant, kind=LeanExecutor)
+    graph.spin(plant, kind=EventsExecutor)
     graph.meet(listener.node, plant)
     for force in (math.nan, math.inf, -math.inf):
         listener.forces.publish(Float64(data=force))
@@ -168,7 +168,7 @@ def test_commands_that_are_not_finite_are_refused_counted_and_reported(graph: Gr
 def test_controller_refuses_bad_states_and_stops_with_them(graph: Graph) -> None:
     listener = Listener(graph)
     pid = _make(graph, PidNode, **GAINS)
-    graph.spin(pid, kind=LeanExecutor)
+    graph.spin(pid, kind=EventsExecutor)
     states = listener.node.create_publisher(JointState, "joint_states", 100)
     graph.meet(listener.node, pid)
 

@@ -9,7 +9,7 @@ import pkgutil
 import fric.verification
 import plotly.graph_objects as go
 import pytest
-from fric.bench.benchmark import Figure
+from fric.figure import Figure
 from fric.report.verification import verification_page
 from fric.verification import VERIFICATIONS
 from fric.verification.verification import Evidence, Verification

@@ -15,11 +15,11 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 from scipy.special import ndtri
 
+from ..figure import Figure
 from ..identification.calibration import Calibration
 from ..identification.result import Identification, IdentificationError
 from ..record import Array
 from ..threads import alone
-from .benchmark import Figure
 
 __all__ = ["SEEDS", "Finding", "count", "figures_of", "of_model", "over_interval"]
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -141,6 +142,22 @@ def _plant(mass: float, damping: float, period: float, delay: float) -> tuple[Ar
     return numerator, np.polymul(det, np.concatenate([[1.0], np.zeros(int(n) + 1)]))
 
 
+def _most_integral(loop: _Loop, limits: tuple[float, float], kp: float, kd: float) -> float:
+    """Largest k_i that keeps ``limits`` of |S| and |T| with these two gains; negative when not even 0 does."""
+
+    def good(ki: float) -> bool:
+        peaks = loop.peaks(kp, ki, kd)
+        return peaks[0] <= limits[0] and peaks[1] <= limits[1] and loop.stable(kp, ki, kd)
+
+    if not good(0.0):
+        return -1.0
+    low, high = 0.0, kp * kp / max(kd, 1e-12)
+    for _ in range(24):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if good(middle) else (low, middle)
+    return low
+
+
 def tune(
     mass: float,
     damping: float,
@@ -172,22 +189,7 @@ def tune(
     if min(damping, delay, filter_time) < 0.0:
         raise TuningError("tuning", "damping, delay or filter_time is negative", "give numbers of at least 0")
     loop = _Loop(mass, damping, period, delay, filter_time, 2)
-
-    def most(kp: float, kd: float) -> float:
-        """Largest k_i that keeps the limits with these two gains; negative when not even 0 does."""
-
-        def good(ki: float) -> bool:
-            peaks = loop.peaks(kp, ki, kd)
-            return peaks[0] <= sensitivity and peaks[1] <= complementary and loop.stable(kp, ki, kd)
-
-        if not good(0.0):
-            return -1.0
-        low, high = 0.0, kp * kp / max(kd, 1e-12)
-        for _ in range(24):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if good(middle) else (low, middle)
-        return low
-
+    most = partial(_most_integral, loop, (sensitivity, complementary))
     # Crossover and ratio in the units of the loop: the delay sets the scale of time, the mass that of force.
     scale = 1.0 / (0.5 * period + delay + filter_time + period)
 

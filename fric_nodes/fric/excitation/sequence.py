@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence as Listed
 
 import numpy as np
 
-from ..excitation_kind import Feedback, Points, Trajectory
+from ..excitation_kind import Excitation, ExcitationError, Feedback, Points, Trajectory
 from ..record import Array
 
-__all__ = ["Sequence"]
+__all__ = ["SampledPlan", "Sequence", "sequence_of"]
+
+_BLOCK = 512  # samples planned together; always the same ones, so that every sample has the same bits in every run
 
 
 class Sequence:
@@ -65,3 +68,56 @@ class Sequence:
             if part is not None and start <= local < start + part.duration:
                 return part.force(local - float(start), position)
         return float(self.at(instant).position[0])
+
+
+class SampledPlan:
+    """A plan, sample by sample.
+
+    Args:
+        plan: without feedback.
+        period: time between samples [s].
+    """
+
+    def __init__(self, plan: Sequence, period: float) -> None:
+        self._plan = plan
+        self._period = period
+        self._block: tuple[int, list[list[float]]] = (-1, [])
+
+    def at(self, sample: int) -> list[float]:
+        """Position [x], velocity [x/s] and acceleration [x/s^2] at sample number ``sample``."""
+        number, at = divmod(sample, _BLOCK)
+        if self._block[0] != number:
+            times = np.arange(number * _BLOCK, (number + 1) * _BLOCK, dtype=np.float64) * self._period
+            self._block = (number, np.stack(self._plan.at(times), axis=1).tolist())
+        return self._block[1][at]
+
+
+def sequence_of(
+    kinds: Listed[Excitation],
+    output: str,
+    number: Callable[[str, str], float],
+    text: Callable[[str, str], str],
+    random: np.random.Generator,
+    rests: tuple[float, float, bool],
+) -> Sequence:
+    """Excitations of the catalogue after one another.
+
+    Args:
+        kinds: in their order.
+        output: what is published: ``"reference"`` or ``"force"``.
+        number: value of a parameter, from the excitation's id and the parameter's name.
+        text: value of a parameter that is a text, likewise.
+        random: for what is random in them.
+        rests: delay [s], pause [s] and repetition, as for :class:`Sequence`.
+
+    Raises:
+        ExcitationError: an excitation has no such output, or a value that it can't use.
+    """
+    parts = []
+    for kind in kinds:
+        if output not in kind.outputs:
+            problem = f"{kind.id} can't be published as a {output}"
+            raise ExcitationError("parameter 'output'", problem, f"set it to {' or '.join(kind.outputs)}")
+        numbers = {p.name: number(kind.id, p.name) for p in kind.parameters}
+        parts.append(kind.part(numbers, {t.name: text(kind.id, t.name) for t in kind.texts}, random))
+    return Sequence(parts, *rests)

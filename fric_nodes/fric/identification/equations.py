@@ -115,16 +115,9 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
     time = np.concatenate([s.time[edge : s.time.shape[0] - edge : decimation] for s in stretches])
     starts: Index = np.cumsum([0, *(part.shape[0] for part in force[:-1])], dtype=np.int64)
     reach = (decimation if decimation > 1 else 0) + int(np.ceil(_MARGIN / cutoff * rate))
-    given = options.rest_velocity
-    noise = _unclear(stretches, cutoff) if given is None else 0.0
+    noise, still, rest = _rest_limits(options.rest_velocity, stretches, velocity, cutoff, (rate, decimation))
     speeds, steps = tuple(s.velocity for s in stretches), tuple(s.sample_time for s in stretches)
     rests = Rests(speeds, steps, noise, edge, decimation, reach, cutoff < _MECHANICS)
-    if given is None:
-        # Below its own noise a velocity says nothing, however slow the rest of the recording is.
-        slow = SLOW * float(np.quantile(np.abs(velocity), 0.98))
-        still, rest = max(slow, noise), max(slow, _unclear(stretches, min(cutoff, _WINDOW_BAND * rate / decimation)))
-    else:
-        still = rest = given
     resting = [at_rest(part, rest, decimation / rate) for part in np.split(velocity, starts[1:])]
     sliding = ~np.concatenate(resting)
     rest_time = float(np.sum(~sliding)) * decimation / rate
@@ -133,14 +126,7 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
             f"{rest_time:.2f} s at rest (slower than {rest:.3g} {records[0].units.position}/s) are left out: "
             "there the force doesn't show sliding friction"
         )
-    clear = sliding & rests.clear(still)
-    if rests.rounds:
-        turning = replace(rests, rounds=False)
-        with_turns = sliding & turning.clear(still)
-        square = np.concatenate([thin(stretch, stretch.acceleration) for stretch in stretches]) ** 2
-        if np.sum(square[clear]) < _AT_TURNS * np.sum(square[with_turns]):
-            # Strokes at constant speed show their inertia at the reversals only.
-            rests, clear = turning, with_turns
+    rests, clear = _clear_rows(rests, sliding, still, lambda: np.concatenate([thin(s, s.acceleration) for s in stretches]))
     if not can_stand_for(clear, sliding, velocity):
         clear = sliding
         notes.append(
@@ -148,20 +134,42 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
             "strokes, or raise the cutoff"
         )
     return Equations(
-        tuple(stretches),
-        thin,
-        np.concatenate(force),
-        velocity,
-        time,
-        starts,
-        sliding,
-        clear,
-        rest,
-        tuple(notes),
-        rests,
-        cutoff,
-        decimation,
-    )
+        tuple(stretches), thin, np.concatenate(force), velocity, time, starts, sliding, clear, rest, tuple(notes), rests,
+        cutoff, decimation,
+    )  # fmt: skip
+
+
+def _rest_limits(
+    given: float | None, stretches: list[Stretch], velocity: Array, cutoff: float, rates: tuple[float, int]
+) -> tuple[float, float, float]:
+    """Noise of the velocity, and the speeds below which a row counts as still and as at rest [x/s].
+
+    Args:
+        given: the limit asked for [x/s]; None: from the recordings.
+        stretches: of the recordings.
+        velocity: in the rows [x/s].
+        cutoff: of the filter [Hz].
+        rates: samples per second, and samples per row.
+    """
+    if given is not None:
+        return 0.0, given, given
+    noise = _unclear(stretches, cutoff)
+    # Below its own noise a velocity says nothing, however slow the rest of the recording is.
+    slow = SLOW * float(np.quantile(np.abs(velocity), 0.98))
+    return noise, max(slow, noise), max(slow, _unclear(stretches, min(cutoff, _WINDOW_BAND * rates[0] / rates[1])))
+
+
+def _clear_rows(rests: Rests, sliding: Mask, still: float, acceleration: Callable[[], Array]) -> tuple[Rests, Mask]:
+    """Rows that no rest reaches into, where a joint slower than ``still`` [x/s] rests; and how they were told."""
+    clear = sliding & rests.clear(still)
+    if rests.rounds:
+        turning = replace(rests, rounds=False)
+        with_turns = sliding & turning.clear(still)
+        square = acceleration() ** 2
+        if np.sum(square[clear]) < _AT_TURNS * np.sum(square[with_turns]):
+            # Strokes at constant speed show their inertia at the reversals only.
+            return turning, with_turns
+    return rests, clear
 
 
 def _even(record: Record, notes: list[str]) -> Record:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,6 +52,105 @@ class Solution:
     free: Mask
 
 
+class _Limits(NamedTuple):
+    """Where to stop: relative step, relative decrease of the cost, number of slow steps in a row."""
+
+    point: float
+    cost: float
+    slow: int
+
+
+class _Descent:
+    """One minimisation on its way: the point reached, its residuals and their Jacobian."""
+
+    def __init__(
+        self,
+        function: Callable[[Array], Array],
+        start: Array,
+        bounds: tuple[Array, Array],
+        difference: float,
+        secant: bool,
+        threads: int,
+    ) -> None:
+        self._function = function
+        self._bounds = bounds
+        self._difference = difference
+        self._secant = secant
+        self._threads = threads
+        self._point = start
+        self._residual = function(start)
+        self._cost = float(self._residual @ self._residual)
+        self._damping, self._growth = _FIRST_DAMPING, 2.0
+        self._slow = 0  # steps in a row that gained nearly nothing, as where differences can't see the minimum any better
+        self._jacobian = np.empty((self._residual.shape[0], start.shape[0]))
+        self._exact, self._foreseen = False, False  # the Jacobian at this point, and the step that led to it
+
+    def solution(self, converged: bool, iterations: int) -> Solution:
+        """The point reached."""
+        lower, upper = self._bounds
+        free = _inwards(self._jacobian.T @ self._residual, lower - self._point, upper - self._point)
+        return Solution(self._point, self._residual, self._jacobian, converged, iterations, free)
+
+    def stopped(self, iterations: int) -> Solution:
+        """The point reached when no further step is allowed."""
+        if not (self._secant and self._foreseen):
+            self._differentiate()
+        return self.solution(False, iterations)
+
+    def _differentiate(self) -> tuple[Array, Array]:
+        """Take the Jacobian here anew; the normal matrix and the gradient."""
+        _differences(
+            self._function, self._point, self._residual, self._bounds[1], self._difference, self._jacobian, self._threads
+        )
+        self._exact = True
+        return self._jacobian.T @ self._jacobian, self._jacobian.T @ self._residual
+
+    def ends(self, limits: _Limits) -> bool:
+        """Go one step down; True where there is none worth going."""
+        lower, upper = self._bounds
+        if self._secant and self._exact and self._foreseen:
+            self._exact = False
+            normal, gradient = self._jacobian.T @ self._jacobian, self._jacobian.T @ self._residual
+        else:
+            normal, gradient = self._differentiate()
+        for _ in range(30):
+            step = _proposal(normal, gradient, self._damping, self._point, lower, upper)
+            # Decrease of the sum of squares that the linear model promises.
+            promised = -float(step @ (2.0 * gradient + normal @ step))
+            small = np.all(np.abs(step) <= limits.point * (np.abs(self._point) + limits.point))
+            if small or 0 < limits.slow <= self._slow or 0.0 <= promised <= limits.cost * self._cost:
+                return True
+            if promised < 0.0:
+                # A bound has bent the step uphill; a shorter one goes along the gradient.
+                self._damping, self._growth = max(self._damping, 1e-6) * self._growth, 2.0 * self._growth
+                continue
+            if self._goes_down(np.clip(self._point + step, lower, upper), promised, limits.cost):
+                return False
+            self._damping *= self._growth
+            self._growth *= 2.0
+            if not self._exact:
+                normal, gradient = self._differentiate()
+        # No direction goes down: the differences have said all they can.
+        return True
+
+    def _goes_down(self, trial: Array, promised: float, tolerance: float) -> bool:
+        """Go to ``trial`` when the cost is smaller there."""
+        residual = self._function(trial)
+        cost = float(residual @ residual)
+        gain = (self._cost - cost) / promised
+        if not gain > 0.0:
+            return False
+        self._slow = self._slow + 1 if self._cost - cost <= tolerance * self._cost else 0
+        self._foreseen = abs(gain - 1.0) < _FORESEEN
+        if self._secant and self._foreseen:
+            moved = trial - self._point
+            self._jacobian += np.outer(residual - self._residual - self._jacobian @ moved, moved / (moved @ moved))
+        self._point, self._residual, self._cost = trial, residual, cost
+        self._damping = max(self._damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 1e-12)
+        self._growth = 2.0
+        return True
+
+
 def minimise(
     function: Callable[[Array], Array],
     start: Array,
@@ -80,59 +180,12 @@ def minimise(
         secant: True to take differences at every other point only, where the step to it went as foreseen.
         threads: that evaluate ``function`` for differences; more than one helps where it leaves the interpreter to others.
     """
-    point = np.clip(start, lower, upper)
-    residual = function(point)
-    cost = float(residual @ residual)
-    damping, growth = _FIRST_DAMPING, 2.0
-    slow = 0  # steps in a row that gained nearly nothing, as where differences can't see the minimum any better
-    jacobian = np.empty((residual.shape[0], point.shape[0]))
-    exact, foreseen = False, False  # the Jacobian at this point, and the step that led to it
-
-    def solution(converged: bool, iterations: int) -> Solution:
-        free = _inwards(jacobian.T @ residual, lower - point, upper - point)
-        return Solution(point, residual, jacobian, converged, iterations, free)
-
+    descent = _Descent(function, np.clip(start, lower, upper), (lower, upper), difference, secant, threads)
+    limits = _Limits(point_tolerance, cost_tolerance, most_slow)
     for iteration in range(1, max_iterations + 1):
-        exact = not (secant and exact and foreseen)
-        if exact:
-            _differences(function, point, residual, upper, difference, jacobian, threads)
-        normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
-        for _ in range(30):
-            step = _proposal(normal, gradient, damping, point, lower, upper)
-            # Decrease of the sum of squares that the linear model promises.
-            promised = -float(step @ (2.0 * gradient + normal @ step))
-            small = np.all(np.abs(step) <= point_tolerance * (np.abs(point) + point_tolerance))
-            if small or 0 < most_slow <= slow or 0.0 <= promised <= cost_tolerance * cost:
-                return solution(True, iteration)
-            if promised < 0.0:
-                # A bound has bent the step uphill; a shorter one goes along the gradient.
-                damping, growth = max(damping, 1e-6) * growth, 2.0 * growth
-                continue
-            trial = np.clip(point + step, lower, upper)
-            trial_residual = function(trial)
-            trial_cost = float(trial_residual @ trial_residual)
-            gain = (cost - trial_cost) / promised
-            if gain > 0.0:
-                slow = slow + 1 if cost - trial_cost <= cost_tolerance * cost else 0
-                foreseen = abs(gain - 1.0) < _FORESEEN
-                if secant and foreseen:
-                    moved = trial - point
-                    jacobian += np.outer(trial_residual - residual - jacobian @ moved, moved / (moved @ moved))
-                point, residual, cost = trial, trial_residual, trial_cost
-                damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 1e-12)
-                growth = 2.0
-                break
-            damping *= growth
-            growth *= 2.0
-            if not exact:
-                _differences(function, point, residual, upper, difference, jacobian, threads)
-                normal, gradient, exact = jacobian.T @ jacobian, jacobian.T @ residual, True
-        else:
-            # No direction goes down: the differences have said all they can.
-            return solution(True, iteration)
-    if not (secant and foreseen):
-        _differences(function, point, residual, upper, difference, jacobian, threads)
-    return solution(False, max_iterations)
+        if descent.ends(limits):
+            return descent.solution(True, iteration)
+    return descent.stopped(max_iterations)
 
 
 def _differences(

@@ -50,13 +50,7 @@ _DIFFERENCE = 1e-3  # relative step of derivatives
 _NEARER = 8  # steps towards the method's own values
 
 
-def foresee(
-    structure: Model,
-    records: Sequence[Record],
-    options: Options,
-    predicts: str,
-    experiments: bool = True,
-) -> Foreseen:
+def foresee(structure: Model, records: Sequence[Record], options: Options, predicts: str, experiments: bool = True) -> Foreseen:
     """What ``records`` can tell about ``structure``.
 
     Args:

@@ -17,14 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ..record import Array, Index
-
-if TYPE_CHECKING:
-    from .view import View
+from .view import View
 
 __all__ = ["MATTERS", "Growth", "Lag", "LagCurves", "judged"]
 
@@ -210,11 +208,21 @@ class LagCurves:
         return Growth(slope, error, start, left, inertia, effect, least)
 
 
+_CURVES: WeakKeyDictionary[View, LagCurves] = WeakKeyDictionary()
+
+
+def _curves(view: View) -> LagCurves:
+    """The curves of ``view``, which two checks ask for, made once and kept as long as the view."""
+    if view not in _CURVES:
+        _CURVES[view] = LagCurves(view)
+    return _CURVES[view]
+
+
 def judged(view: View, growing: bool = False) -> tuple[LagCurves | None, str]:
     """The curves of ``view``, or None and why a lag, constant or growing, can't be seen in it."""
     if not view.moves:
         return None, "it does not move"
-    curves = view.lags
+    curves = _curves(view)
     if not curves.enough:
         return None, "too few sliding samples"
     if growing:

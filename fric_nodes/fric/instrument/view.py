@@ -14,7 +14,6 @@ import numpy as np
 from scipy import signal
 
 from ..record import Array, Index, Mask, Record
-from .lag import LagCurves
 
 __all__ = ["Balance", "View", "friction_along", "imbalance", "resolution_of", "runs"]
 
@@ -226,11 +225,6 @@ class View:
             way = np.where(last >= 0, distance - distance[starts[np.maximum(last, 0)]], 0.0)
         stroke = float(np.quantile(self.strokes, 0.75))
         return np.asarray(self.moving & self.usable & (way > _AFTER_REVERSAL * stroke))
-
-    @cached_property
-    def lags(self) -> LagCurves:
-        """Lag of the effort against the motion."""
-        return LagCurves(self)
 
     @cached_property
     def balance(self) -> Balance:

@@ -140,6 +140,30 @@ _FREE_RUN = (
 )
 
 
+def _verdict_section(result: Identification) -> Section:
+    """How well the model explains the recordings, in three numbers and a sentence."""
+    score = result.validation if result.validation is not None else result.train
+    which = "on the validation recording" if result.validation is not None else "on the recording it was fitted to"
+    units = result.model.units
+    return Section(
+        "",
+        (
+            tiles(
+                [
+                    (f"{score.relative_force_error_percent:.3g} %", f"relative force error {which}"),
+                    (f"{score.noe:.3g} %", f"of the force's variance left over (normalised output error), {which}"),
+                    (
+                        f"{significant(score.position_rmse, 3)} {units.position}",
+                        f"position error (RMS) of a simulation from the force alone (free run), {which}",
+                    ),
+                ]
+            ),
+            paragraph(_FREE_RUN, "note"),
+            paragraph(f"Status: {result.status}."),
+        ),
+    )
+
+
 def identification_report(
     result: Identification, train: Sequence[Record], validation: Sequence[Record], options: Options
 ) -> str:
@@ -151,9 +175,6 @@ def identification_report(
         validation: recordings kept apart; may be empty.
         options: as in the fit.
     """
-    score = result.validation if result.validation is not None else result.train
-    which = "on the validation recording" if result.validation is not None else "on the recording it was fitted to"
-    units = result.model.units
     effects = ", ".join(held.effect.title for held in result.model.terms) or "no friction"
     title = result.model.plant.title
     lead = (
@@ -162,23 +183,7 @@ def identification_report(
     )
     found = equations(list(train), options)
     sections = [
-        Section(
-            "",
-            (
-                tiles(
-                    [
-                        (f"{score.relative_force_error_percent:.3g} %", f"relative force error {which}"),
-                        (f"{score.noe:.3g} %", f"of the force's variance left over (normalised output error), {which}"),
-                        (
-                            f"{significant(score.position_rmse, 3)} {units.position}",
-                            f"position error (RMS) of a simulation from the force alone (free run), {which}",
-                        ),
-                    ]
-                ),
-                paragraph(_FREE_RUN, "note"),
-                paragraph(f"Status: {result.status}."),
-            ),
-        ),
+        _verdict_section(result),
         Section("Parameters", (parameter_table(result),)),
         Section(
             "Fit",

@@ -9,9 +9,9 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
 from ..diagnosis.prove.examination import Examination
 from ..diagnosis.prove.scoring import Outcome, Rate, Score
+from ..figure import Figure
 from .figures import COLOURS
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 from .verification import goal, quantity

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..verification.verification import Evidence, Verification
 from .page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 

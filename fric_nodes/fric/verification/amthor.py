@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from scipy.optimize import least_squares
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..friction.dnlrx import DnlrxModel
 from ..identification.dnlrx.cost import Cost
 from ..identification.dnlrx.fit import DECIMATION, DnlrxFit, fit_prepared, name

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..friction.asperity import AsperityParameters, AsperityPopulation
 from ..record import Array
 from ..report.figures import COLOURS, Curve, scatter_and_curves

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from scipy.optimize import curve_fit
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..friction.asperity import AsperityParameters, AsperityPopulation
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves, stacked

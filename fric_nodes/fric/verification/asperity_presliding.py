@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..friction.asperity import AsperityParameters, AsperityPopulation
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves

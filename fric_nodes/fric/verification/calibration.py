@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..identification.calibration import AXES, Calibration, calibrate
 from ..identification.result import Options
 from ..report.figures import COLOURS

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import build_model, term
 from ..model_file import read_model
 from ..record import Array, Record

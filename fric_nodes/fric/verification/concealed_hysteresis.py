@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import build_model, term
 from ..record import Record
 from . import pneumatic_reference as reference

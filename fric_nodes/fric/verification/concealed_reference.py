@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
 from ..diagnosis import diagnose
 from ..diagnosis.prove.axis import Setting
 from ..diagnosis.prove.experiment import Bench, draw_recording
 from ..diagnosis.prove.physics import Physics
 from ..diagnosis.result import Diagnosis, Finding, Prediction
 from ..diagnosis.track import smooth
+from ..figure import Figure
 from ..model import Model
 from ..record import Array, Record
 from ..report.figures import Curve, scatter_and_curves, shaded, stacked

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from scipy.integrate import solve_ivp
 from scipy.signal import butter, filtfilt
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..friction.dnlrx import DnlrxModel, DnlrxPredictor, DnlrxSimulator, from_mechanics
 from ..friction.dnlrx_regression import deformations, from_coefficients, noe, regressors, sliding_start
 from ..model import build_model, term

@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from scipy.integrate import solve_ivp
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import Model, build_model, term
 from ..record import Array
 from ..report.figures import COLOURS, Curve, scatter_and_curves

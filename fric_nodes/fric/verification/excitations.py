@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
 from ..excitation import EXCITATIONS
 from ..excitation.graded_rests import Strokes
 from ..excitation.parametric_oscillation import Oscillation
 from ..excitation.prbs import maximum_length_sequence
 from ..excitation.velocity_ladder import Ladder
 from ..excitation_kind import Excitation, Points, Trajectory
+from ..figure import Figure
 from ..model import build_model, term
 from ..record import Array
 from ..report.figures import Curve, stacked

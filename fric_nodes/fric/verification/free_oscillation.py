@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..identification.methods.hilbert import hilbert
 from ..identification.methods.log_decrement import log_decrement
 from ..identification.methods.parametric_oscillation import parametric_mechanics

@@ -20,7 +20,7 @@ import plotly.graph_objects as go
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import Model, Term, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves, stacked

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import build_model, term
 from ..record import Array
 from ..report.figures import Curve, stacked

@@ -7,9 +7,9 @@ and the encoder flickers by a count. A short form of ``fric bench online``, whic
 
 from __future__ import annotations
 
-from ..bench.benchmark import Figure
-from ..bench.benchmarks.online import follow, wander
+from ..figure import Figure
 from ..identification.online import ESTIMATORS
+from ..identification.online.trials import follow, wander
 from ..report.figures import Curve, stacked
 from .verification import Evidence, Verification
 

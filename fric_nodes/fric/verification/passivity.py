@@ -22,9 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
 from ..effect import Context, Effect, Place
 from ..effects import EFFECTS
+from ..figure import Figure
 from ..model import Model, Term, build_model, term
 from ..parameter import Parameter
 from ..record import Array

@@ -18,7 +18,7 @@ import numpy as np
 import plotly.graph_objects as go
 from scipy.integrate import solve_ivp
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import Model, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves, stacked
@@ -292,6 +292,12 @@ def _cart() -> tuple[list[Figure], tuple[go.Figure, str]]:
         Figure("cart held by friction while the pole falls and swings: way", float(np.max(np.abs(held[:, 0]))), "m", "== 0"),
         Figure("friction that it takes", float(np.max(np.abs(reaction))), "N", "<= 9"),
     ]
+    return figures, _cart_plot((slips, friction), (held, reaction))
+
+
+def _cart_plot(slipping: tuple[Array, Array], sticking: tuple[Array, Array]) -> tuple[go.Figure, str]:
+    """States and friction of a cart that slips and of one that sticks."""
+    (slips, friction), (held, reaction) = slipping, sticking
     t = 1e-3 * np.arange(1, 5001, dtype=np.float64)
     panels = [
         (
@@ -310,7 +316,7 @@ def _cart() -> tuple[list[Figure], tuple[go.Figure, str]]:
             [Curve("3 N of friction", t, friction, "after"), Curve("9 N: the cart sticks", t, reaction, "before", "dot")],
         ),
     ]
-    return figures, (stacked(panels, "time [s]", 180), "A pole falls from 1 rad off upright on a cart that sticks and slips.")
+    return stacked(panels, "time [s]", 180), "A pole falls from 1 rad off upright on a cart that sticks and slips."
 
 
 def _influence() -> tuple[list[Figure], tuple[go.Figure, str]]:

@@ -16,7 +16,7 @@ import numpy as np
 import plotly.graph_objects as go
 from scipy.ndimage import uniform_filter1d
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..friction.tensor_product import TensorProductFriction, from_data, from_model, velocity_grid
 from ..model import Model, build_model, term
 from ..model_file import read_model

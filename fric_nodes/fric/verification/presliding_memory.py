@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import Term, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves

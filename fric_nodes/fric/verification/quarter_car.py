@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import Model
 from ..model_file import read_model
 from ..record import Array, Mask
@@ -247,6 +247,18 @@ def _independent(conventional: Model) -> Figure:
     return Figure("without friction: largest deviation of any state from Radau's method", worst, "of its range", "<= 0.0001")
 
 
+def _parts(model: Model, general: Run) -> list[Curve]:
+    """The parts of friction over the body's velocity."""
+    # Where it sticks, the force isn't made of parts; a gap in the line.
+    speed = np.where(general.slides, general.velocity, np.nan)
+    fallen = model.value("stribeck.force") * np.exp(-np.abs(speed) / model.value("stribeck.velocity"))
+    coulomb = general.contact - np.sign(speed) * fallen
+    return [
+        Curve("viscous and transition", speed, general.friction - coulomb, "second"),
+        Curve("Coulomb, by normal force", speed, coulomb, "after"),
+    ]
+
+
 def _plots(model: Model, general: Run, simple: Run, plain: Run) -> Sequence[tuple[go.Figure, str]]:
     t = general.time
     wanted = road(t)
@@ -279,14 +291,6 @@ def _plots(model: Model, general: Run, simple: Run, plain: Run) -> Sequence[tupl
         Curve("general form", general.velocity, general.friction, "after"),
         Curve("simple form", simple.velocity, simple.friction, "before", "dot"),
     ]
-    # Where it sticks, the force isn't made of parts; a gap in the line.
-    speed = np.where(general.slides, general.velocity, np.nan)
-    fallen = model.value("stribeck.force") * np.exp(-np.abs(speed) / model.value("stribeck.velocity"))
-    coulomb = general.contact - np.sign(speed) * fallen
-    parts = [
-        Curve("viscous and transition", speed, general.friction - coulomb, "second"),
-        Curve("Coulomb, by normal force", speed, coulomb, "after"),
-    ]
     return [
         (
             stacked([("road [m]", inputs)], "time [s]", 320),
@@ -306,7 +310,7 @@ def _plots(model: Model, general: Run, simple: Run, plain: Run) -> Sequence[tupl
             "Friction over the body's velocity, as Figs. 11 and 12: loops in the general form, one curve in the simple one.",
         ),
         (
-            scatter_and_curves(None, parts, "body velocity [m/s]", "friction [N]"),
+            scatter_and_curves(None, _parts(model, general), "body velocity [m/s]", "friction [N]"),
             "Its parts while the body slides, as Fig. 13: the viscous part dominates, the Coulomb part makes the loop.",
         ),
     ]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..identification.methods.static_map import static_map
 from ..identification.result import Options
 from ..identification.start import start_model

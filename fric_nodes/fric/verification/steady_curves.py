@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 from scipy.optimize import brentq
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import Model, Term, build_model, term
 from ..record import Array
 from ..report.figures import COLOURS, Curve, scatter_and_curves

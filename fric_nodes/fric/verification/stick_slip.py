@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import Model, Term, build_model, term
 from ..record import Array
 from ..report.figures import Curve, stacked

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..friction.tensor_product import TensorProductFriction, from_model, velocity_grid
 from ..friction.tensor_product_transformation import TensorProduct, deviation, sample, transform
 from ..model import Model, build_model, term

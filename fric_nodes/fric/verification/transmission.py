@@ -17,7 +17,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 from ..model import Model, Term, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves, stacked

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import plotly.graph_objects as go
 
-from ..bench.benchmark import Figure
+from ..figure import Figure
 
 __all__ = ["Evidence", "Verification"]
 

@@ -6,7 +6,8 @@ import re
 import tempfile
 from pathlib import Path
 
-from fric.bench.benchmark import Benchmark, Figure
+from fric.bench.benchmark import Benchmark
+from fric.figure import Figure
 from fric.shared_files import config_file
 
 from fric_nodes.demo.graph import Graph, NodeSetup, free_domain

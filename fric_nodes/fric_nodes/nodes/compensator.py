@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from fric.control.feedforward import Feedforward
+from fric.control.reference import ReferencePoint
 from fric.errors import InputError
 from fric.model import Model
 from fric.model_file import read_model
 
-from fric_interfaces.msg import FrictionModel, Reference
-from fric_interfaces.srv import LoadModel
+from fric_interfaces.msg import Reference
 
-from .base import LOCK_STEP, PERIOD, LoopNode
-from .convert import MessageError, model_from_message
-from .forces import STAMPED, ForcePublisher, ReferencePoint, reference_in
-from .lockstep import Answers
-from .main import run
-from .model_intake import ModelIntake
-from .parameters import NodeParameter
-from .qos import MODEL, SAMPLES
+from ..forces import STAMPED, ForcePublisher, reference_in
+from ..lockstep import Answers
+from ..loop import LOCK_STEP, PERIOD, LoopNode
+from ..model_intake import ModelIntake
+from ..parameters import NodeParameter
+from ..qos import SAMPLES
+from ..run import run
 
 __all__ = ["CompensatorNode", "main"]
 
@@ -62,13 +62,11 @@ class CompensatorNode(LoopNode):
         )
         if settings.text("model_file"):
             self._feedforward.set_model(self._checked(read_model(settings.text("model_file"))), at_once=True)
-        self._intake = ModelIntake(self, self._use)
+        self._intake = ModelIntake(self, self._checked, self._feedforward.set_model)
         settings.when_changed(self._on_settings)
         self._forces = ForcePublisher(self, "feedforward_force")
         self._answers: Answers[ReferencePoint, float] = Answers()
         self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
-        self.create_subscription(FrictionModel, "friction/model", self._on_model, MODEL)
-        self.create_service(LoadModel, "~/load_model", self._on_load)
 
     def _preview(self) -> float:
         given = self.settings.number("preview")
@@ -94,34 +92,11 @@ class CompensatorNode(LoopNode):
             raise InputError("model", f"is of joint '{model.joint}'", f"give one of joint '{self.joint}'")
         return self._feedforward.selected(model)
 
-    def _use(self, model: Model) -> None:
-        self._feedforward.set_model(model)
-        self.counters["models"] += 1
-
-    def _on_model(self, message: FrictionModel) -> None:
-        if not self.settings.flag("follow_topic"):
-            return
-        try:
-            self._intake.take(self._checked(model_from_message(message)))
-        except InputError as error:
-            self.refuse("model", error)
-
-    async def _on_load(self, request: LoadModel.Request, response: LoadModel.Response) -> LoadModel.Response:
-        try:
-            model = read_model(request.path) if request.path else model_from_message(request.model)
-            await self._intake.take(self._checked(model))
-            response.success, response.message = True, f"{model.plant.id} with {', '.join(model.prefixes) or 'no terms'}"
-        except InputError as error:
-            response.success, response.message = False, str(error)
-        return response
-
     # References
 
     def _on_reference(self, message: Reference) -> None:
-        try:
-            reference = reference_in(message)
-        except MessageError as error:
-            self.refuse("reference", error)
+        reference = self.usable("reference", reference_in, message)
+        if reference is None:
             return
         if self.lock_step:
             self._on_step(reference)
@@ -147,10 +122,8 @@ class CompensatorNode(LoopNode):
         self._forces.publish(stamp, force)
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run(CompensatorNode, args)
-
+main = partial(run, CompensatorNode)
+"""Serve the node until a signal comes."""
 
 if __name__ == "__main__":
     main()

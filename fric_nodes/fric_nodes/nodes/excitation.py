@@ -8,45 +8,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
-from fric.excitation import EXCITATIONS
-from fric.excitation.sequence import Sequence
-from fric.excitation_kind import OUTPUTS, ExcitationError
-from fric.record import Units
+from fric.excitation.sequence import SampledPlan
 from sensor_msgs.msg import JointState
 
 from fric_interfaces.msg import Reference
 
-from .base import LOCK_STEP, PERIOD, LoopNode, wall_clock
-from .convert import MessageError, from_seconds, joint_sample, nanoseconds, set_stamp
-from .forces import STAMPED, ForcePublisher
-from .main import run
-from .parameters import NodeParameter, from_declaration
-from .qos import SAMPLES
+from ..convert import from_seconds, nanoseconds, set_stamp
+from ..excitation_parameters import PLAN, planned
+from ..forces import STAMPED, ForcePublisher
+from ..loop import LOCK_STEP, PERIOD, LoopNode, wall_clock
+from ..parameters import NodeParameter
+from ..qos import SAMPLES
+from ..run import run
 
 __all__ = ["ExcitationNode", "main"]
 
-_BLOCK = 512  # samples planned together; always the same ones, so that every sample has the same bits in every run
 PARAMETERS = (
     PERIOD,
     LOCK_STEP,
-    NodeParameter("kinds", ["multisine"], "excitations to go through, in this order", choices=tuple(EXCITATIONS)),
-    NodeParameter("seed", 0, "of what is random in them", "", 0, 2**31 - 1),
-    NodeParameter("start_delay", 1.0, "rest before the first", "s", 0.0, 1e6),
-    NodeParameter("pause", 0.5, "rest after each", "s", 0.0, 1e6),
-    NodeParameter("repeat", False, "go through them again and again"),
-    NodeParameter("output", "reference", "what is published; force: position is the force [N or N m]", choices=OUTPUTS),
+    *PLAN,
     STAMPED,
     NodeParameter(
         "look_ahead", 16, "lock-step: samples sent ahead of the plant; makes no difference to the numbers", "", 0, 64
-    ),
-    *(from_declaration(p, kind.id, Units()) for kind in EXCITATIONS.values() for p in kind.parameters),
-    *(
-        NodeParameter(f"{kind.id}.{text.name}", text.default, text.doc, choices=text.choices)
-        for kind in EXCITATIONS.values()
-        for text in kind.texts
     ),
 )
 
@@ -61,7 +48,7 @@ class ExcitationNode(LoopNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("excitation", PARAMETERS, **options)
         settings = self.settings
-        self._plan = self._sequence()
+        self._plan = planned(settings)
         self._forces = ForcePublisher(self, "force_command") if settings.text("output") == "force" else None
         if self._forces is None:
             self._reference = Reference()
@@ -77,26 +64,12 @@ class ExcitationNode(LoopNode):
             self._period_ns = from_seconds(self.period)
             self._ahead = settings.integer("look_ahead")
             self._next = 0
-            self._block: tuple[int, list[list[float]]] = (-1, [])
+            self._samples = SampledPlan(self._plan, self.period)
             self.create_subscription(JointState, "joint_states", self._on_state, SAMPLES)
         else:
             self._epoch, self._origin = wall_clock()
             self._start: int | None = None
             self.create_timer(self.period, self._tick)
-
-    def _sequence(self) -> Sequence:
-        settings = self.settings
-        random = np.random.default_rng(settings.integer("seed"))
-        output = settings.text("output")
-        parts = []
-        for name in settings.texts("kinds"):
-            kind = EXCITATIONS[name]
-            if output not in kind.outputs:
-                problem = f"{name} can't be published as a {output}"
-                raise ExcitationError("parameter 'output'", problem, f"set it to {' or '.join(kind.outputs)}")
-            numbers = {p.name: settings.number(f"{name}.{p.name}") for p in kind.parameters}
-            parts.append(kind.part(numbers, {t.name: settings.text(f"{name}.{t.name}") for t in kind.texts}, random))
-        return Sequence(parts, settings.number("start_delay"), settings.number("pause"), settings.flag("repeat"))
 
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report."""
@@ -115,19 +88,15 @@ class ExcitationNode(LoopNode):
 
     def _on_motion(self, message: JointState) -> None:
         """Answer a joint state; in lock-step time is its stamp, in wall time it begins with the first one."""
-        try:
-            state = joint_sample(message, self.joint)
-        except MessageError as error:
-            self.refuse("joint state", error)
-            return
-        if self._forces is None or not self.has_audience(self._publisher):
+        state = self.state_of_joint(message)
+        if state is None or self._forces is None or not self.has_audience(self._publisher):
             return
         if self.lock_step and state.stamp == self._seen:
             self.counters["repeated states"] += 1
             self._forces.repeat()
             return
         if not self.lock_step and state.stamp <= self._seen:
-            self.refuse("joint state", "its stamp is not later than the last one's")
+            self.refuse_late_state()
             return
         if self._first < 0:
             self._first = state.stamp
@@ -151,16 +120,9 @@ class ExcitationNode(LoopNode):
         # Sent in bursts, which wakes the receivers less often.
         if self._next <= sample + self._ahead // 2:
             while self._next <= sample + self._ahead:
-                self._publish(self._next * self._period_ns, *self._at(self._next))
+                self._publish(self._next * self._period_ns, *self._samples.at(self._next))
                 self._next += 1
             self.deadlines.tick(time.monotonic())
-
-    def _at(self, sample: int) -> list[float]:
-        number, at = divmod(sample, _BLOCK)
-        if self._block[0] != number:
-            times = np.arange(number * _BLOCK, (number + 1) * _BLOCK, dtype=np.float64) * self.period
-            self._block = (number, np.stack(self._plan.at(times), axis=1).tolist())
-        return self._block[1][at]
 
     # Wall time
 
@@ -176,10 +138,8 @@ class ExcitationNode(LoopNode):
         self.deadlines.tick(now * 1e-9)
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run(ExcitationNode, args)
-
+main = partial(run, ExcitationNode)
+"""Serve the node until a signal comes."""
 
 if __name__ == "__main__":
     main()

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from fric.bagio.errors import WriteError
-from fric.bagio.padding import PaddingEraser
-from fric.bagio.types import type_fields
+from diagnostic_msgs.msg import DiagnosticStatus
 from fric.bagio.write import BagWriter
-from rclpy.clock import Clock, ClockType
-from rclpy.qos import QoSProfile
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from .bulk import BulkSubscription, message_class, offered_qos
-from .message_order import ReceiveOrder, StampOrder, TopicIntake
-from .orderly import OrderlyNode, run
-from .parameters import NodeParameter, NodeParameterError, Settings
-from .qos import DIAGNOSTICS
+from ..base import FricNode
+from ..parameters import NodeParameter, NodeParameterError
+from ..recording import Recording
+from ..run import run
 
 __all__ = ["DEFAULT_TOPICS", "PARAMETERS", "RecorderNode", "main"]
 
@@ -50,11 +43,11 @@ PARAMETERS = (
     NodeParameter("queue_depth", 5000, "messages that may wait on each topic between two rounds", lower=1, upper=1_000_000),
     NodeParameter("drain_period", 0.02, "time between two rounds of taking messages", unit="s", lower=0.001, upper=1.0),
 )
-_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
-_BATCH = 20_000  # messages taken from one topic in one round, so that a flood on one cannot starve the others
+_LOOK = 0.05  # [s] between two looks at which topics there are
+_REPORT = 1.0  # [s] between two reports
 
 
-class RecorderNode(OrderlyNode):
+class RecorderNode(FricNode):
     """Writes what is published on its topics into a bag, from its construction to :meth:`close`.
 
     Raises:
@@ -62,143 +55,62 @@ class RecorderNode(OrderlyNode):
     """
 
     def __init__(self, **node_options: Any) -> None:
-        super().__init__("recorder", **node_options)
-        settings = Settings(self, PARAMETERS)
+        super().__init__("recorder", PARAMETERS, **node_options)
+        settings = self.settings
         if not settings.text("bag"):
             raise NodeParameterError("parameter 'bag' of the recorder", "is missing", "name the folder to record into")
         bag = Path(settings.text("bag"))
-        self._all_topics = settings.flag("all_topics")
-        self._by_stamp = settings.text("log_time") == "stamp"
-        self._depth = settings.integer("queue_depth")
-        self._wanted = {self.resolve_topic_name(name) for name in settings.texts("topics") or DEFAULT_TOPICS}
         storage: Any = settings.text("storage")
         compression: Any = settings.text("compression")
         stored = ("joint", "position_unit", "force_unit", "effort_hold", "log_time")
         metadata = {f"fric.{name}": settings.text(name) for name in stored}
-        self._writer = BagWriter(bag, storage=storage, compression=compression, metadata=metadata)
-        self._topics: list[TopicIntake] = []
-        self._order = StampOrder(self._topics, self._warn_restart) if self._by_stamp else ReceiveOrder(self._topics)
-        self._bulk: list[BulkSubscription] = []
-        self._erasers: list[PaddingEraser] = []
-        self._refused: set[str] = set()
+        writer = BagWriter(bag, storage=storage, compression=compression, metadata=metadata)
+        wanted = {self.resolve_topic_name(name) for name in settings.texts("topics") or DEFAULT_TOPICS}
+        self._recording = Recording(
+            self, writer, None if settings.flag("all_topics") else wanted, settings.integer("queue_depth"),
+            settings.text("log_time") == "stamp",
+        )  # fmt: skip
         self._written_before = 0
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", DIAGNOSTICS)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)  # the node's own clock may be simulated, and stand still
-        for period, work in ((settings.number("drain_period"), self.drain), (0.05, self.discover), (1.0, self.report)):
-            self.create_timer(period, work, clock=steady)
+        self.create_timer(settings.number("drain_period"), self.drain, clock=self.steady)
+        self.create_timer(_LOOK, self.discover, clock=self.steady)
+        self.report_every(_REPORT)
         self.get_logger().info(f"recording into {bag}")
 
     def discover(self) -> None:
         """Subscribe to every wanted topic whose type has become known, and follow a change of its quality of service."""
-        known = {subscription.topic: at for at, subscription in enumerate(self._bulk)}
-        for topic, _ in self.get_topic_names_and_types():
-            if topic in self._refused or not (topic in self._wanted or (self._all_topics and "/_" not in topic)):
-                continue
-            # The graph's own list of types also holds those that are only subscribed to.
-            publishers = self.get_publishers_info_by_topic(topic)
-            at = known.get(topic)
-            if at is None:
-                if publishers:
-                    self._subscribe(topic, publishers)
-                continue
-            present = self._bulk[at]
-            qos = offered_qos([p for p in publishers if p.topic_type == present.msgtype], self._depth)
-            if not _receives_as_well(present.qos, qos):
-                # A publisher with less to offer has joined, from which the present subscription would receive nothing.
-                self._take(at)
-                self._bulk[at] = BulkSubscription(self, present.msgtype, topic, qos)
-                present.destroy()
-
-    def _subscribe(self, topic: str, publishers: Sequence[TopicEndpointInfo]) -> None:
-        msgtype = publishers[0].topic_type
-        if any(publisher.topic_type != msgtype for publisher in publishers):
-            self.get_logger().warning(f"{topic}: published with several types; only {msgtype} is recorded")
-        try:
-            first = next(iter(message_class(msgtype).get_fields_and_field_types().values()), "")
-            self._writer.topic(topic, msgtype)
-            qos = offered_qos([p for p in publishers if p.topic_type == msgtype], self._depth)
-            self._bulk.append(BulkSubscription(self, msgtype, topic, qos))
-        except (ImportError, WriteError) as error:
-            self._refused.add(topic)
-            self.get_logger().warning(f"{topic}: not recorded, its type {msgtype} is not installed ({error})")
-            return
-        self._erasers.append(PaddingEraser(msgtype, type_fields(msgtype)))
-        stamped = first == "std_msgs/Header"
-        self._topics.append(TopicIntake(topic, stamped, follows_clock=stamped and msgtype != _DIAGNOSTICS))
-        self.get_logger().info(f"recording {topic} [{msgtype}]")
-
-    def _take(self, at: int) -> None:
-        """Move what topic number ``at`` has received from the middleware's queue into the order."""
-        subscription, intake, add = self._bulk[at], self._topics[at], self._order.add
-        one_publisher = subscription.publishers() <= 1
-        erase = self._erasers[at]
-        for payload, received, sequence in subscription.take(_BATCH):
-            intake.count(sequence, one_publisher)
-            # Without this, neither would retransmissions be recognised nor two runs of one lock-step give the same bag.
-            add(at, erase(payload), received)
+        self._recording.discover()
 
     def drain(self) -> None:
         """Take what the middleware has received on all topics, and write what is complete."""
-        before = time.time_ns()  # the clock on which the middleware stamps reception
-        for at in range(len(self._topics)):
-            self._take(at)
-        self._write(before)
-
-    def _write(self, before: int | None) -> None:
-        write, topics = self._writer.write, self._topics
-        for log_time, at, payload in self._order.release(before):
-            topic = topics[at]
-            write(topic.name, log_time, payload)
-            topic.written += 1
+        self._recording.drain()
 
     @property
     def written(self) -> Counter[str]:
         """Messages written so far, by topic."""
-        return Counter({topic.name: topic.written for topic in self._topics})
+        return Counter({topic.name: topic.written for topic in self._recording.topics})
 
-    def _warn_restart(self, topic: str) -> None:
-        self.get_logger().warning(f"{topic}: stamps start again from an earlier time; the bag goes on, in a part of its own")
-
-    def report(self) -> None:
-        """Publish counts, rate and losses on /diagnostics."""
-        lost = sum(topic.lost for topic in self._topics)
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if lost else DiagnosticStatus.OK,
-            name=f"{self.get_fully_qualified_name()}: recording",
-            message=f"{lost} messages lost" if lost else "no message lost",
-            hardware_id="",
-        )
-        written = sum(self.written.values())
-        values: dict[str, object] = {
-            "written": written,
-            "rate [1/s]": written - self._written_before,
-            "lost": lost,
-        }
-        for topic in self._topics:
-            values[topic.name] = f"{topic.received} received, {topic.repeated} repeated, {topic.lost} lost"
-        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    def condition(self) -> Mapping[str, object]:
+        """Counts, rate and losses."""
+        written, before = self._recording.written, self._written_before
         self._written_before = written
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(array)
+        values: dict[str, object] = {"written": written, "rate [1/s]": written - before, "lost": self._recording.lost}
+        for topic in self._recording.topics:
+            values[topic.name] = f"{topic.received} received, {topic.repeated} repeated, {topic.lost} lost"
+        return values
+
+    def verdict(self, troubles: Sequence[str]) -> tuple[bytes, str]:
+        """A warning once a message was lost."""
+        lost = self._recording.lost
+        return (DiagnosticStatus.WARN, f"{lost} messages lost") if lost else (DiagnosticStatus.OK, "no message lost")
 
     def close(self) -> None:
         """Take what is still in the queues, write it all and close the bag."""
-        self.drain()
-        self._write(None)
-        self._writer.close()
-        lost = sum(topic.lost for topic in self._topics)
-        self.get_logger().info(f"recorded {sum(self.written.values())} messages, {lost} lost")
+        self._recording.close()
+        self.get_logger().info(f"recorded {self._recording.written} messages, {self._recording.lost} lost")
 
 
-def _receives_as_well(present: QoSProfile, offered: QoSProfile) -> bool:
-    """True when a subscription with ``present`` receives from publishers with which ``offered`` is the best that can be had."""
-    return bool(present.reliability >= offered.reliability and present.durability >= offered.durability)
-
-
-def main(args: list[str] | None = None) -> None:
-    """Record until SIGINT or SIGTERM, then close the bag; exit status 2 when the bag cannot be written."""
-    run("recorder", RecorderNode, args)
+main = partial(run, RecorderNode)
+"""Record until SIGINT or SIGTERM, then close the bag; exit status 2 when the bag cannot be written."""
 
 
 if __name__ == "__main__":

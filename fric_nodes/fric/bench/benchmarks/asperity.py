@@ -11,10 +11,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...figure import Figure
 from ...friction.asperity import AsperityParameters, AsperityPopulation
 from ...model import Model, build_model, term
 from ...simulation import Simulator, substeps
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 
 __all__ = ["BENCHMARK"]
 

@@ -5,9 +5,10 @@ What is recorded and how it is counted: :mod:`fric.identification.calibration`.
 
 from __future__ import annotations
 
+from ...figure import Figure
 from ...identification.calibration import AXES, calibrate
 from ...identification.result import Options
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 from ..trials import figures_of
 
 __all__ = ["BENCHMARK", "CASES"]

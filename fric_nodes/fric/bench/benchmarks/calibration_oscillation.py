@@ -12,12 +12,13 @@ from functools import partial
 
 import numpy as np
 
+from ...figure import Figure
 from ...identification import METHODS
 from ...identification.result import Identification, Options
 from ...model import Model, build_model, term
 from ...record import Record, Units
 from ...verification.free_oscillation_reference import INERTIA, PENDULUMS, Pendulum, recorded, swing
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 from ..trials import SEEDS, Finding, count, figures_of, of_model
 
 __all__ = ["BENCHMARK", "CASES", "free", "parametric"]

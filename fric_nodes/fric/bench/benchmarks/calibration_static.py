@@ -15,12 +15,13 @@ import numpy as np
 from scipy import stats
 from scipy.signal import lfilter
 
+from ...figure import Figure
 from ...identification.methods.static_map import static_map
 from ...identification.result import Options
 from ...identification.start import start_model
 from ...identification.static_maps.result import StaticMap
 from ...record import Array, Record, Units
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 from ..trials import SEEDS, Finding, count, figures_of, of_model, over_interval
 
 __all__ = ["BENCHMARK", "CURVE", "TRIALS", "ladder", "mapped"]

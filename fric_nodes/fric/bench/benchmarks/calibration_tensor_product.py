@@ -14,6 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...figure import Figure
 from ...identification import METHODS
 from ...identification.methods.tensor_product import TensorProductIdentification
 from ...identification.result import Options
@@ -22,7 +23,7 @@ from ...model import build_model, term
 from ...record import Array, Record, Units
 from ...simulation import simulate
 from ...verification import pneumatic_reference as reference
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 from ..trials import SEEDS, Finding, count, figures_of, over_interval
 
 __all__ = ["BENCHMARK", "identified", "ratio", "trial"]

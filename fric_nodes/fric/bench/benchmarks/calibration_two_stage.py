@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 
 from ...engine.kernel import loop
+from ...figure import Figure
 from ...identification import METHODS
 from ...identification.result import Options
 from ...model import Model, build_model, term
 from ...record import Array, Record
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 from ..trials import SEEDS, Finding, count, figures_of, of_model
 
 __all__ = ["BENCHMARK", "LIMITS", "PACES", "SPRINGS", "recorded", "structure", "trial", "truth"]

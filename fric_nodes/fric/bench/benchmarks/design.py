@@ -17,6 +17,7 @@ from multiprocessing import get_context
 import numpy as np
 
 from ...excitation import EXCITATIONS
+from ...figure import Figure
 from ...identification import METHODS
 from ...identification.design import Limits, Proposal, Rig, problem_for, propose, rig_of
 from ...identification.design.trial import Choice, gains_for, recorded, simulated
@@ -24,7 +25,7 @@ from ...identification.result import Options
 from ...model import Model, build_model, term
 from ...record import Array, Record
 from ...threads import alone
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 
 __all__ = ["BENCHMARK", "CASES", "Case", "first_recording", "fitted", "proposal", "retold"]
 

@@ -16,11 +16,12 @@ from multiprocessing import get_context
 import numpy as np
 
 from ...diagnosis import diagnose
+from ...figure import Figure
 from ...model import Model, Term, build_model, term
 from ...record import Record
 from ...simulation import simulate
 from ...threads import end_with_parent
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 
 __all__ = ["BENCHMARK"]
 

@@ -16,6 +16,7 @@ from functools import partial
 
 import numpy as np
 
+from ...figure import Figure
 from ...identification import METHODS
 from ...identification.calibration import Calibration
 from ...identification.result import Identification, IdentificationError, Options
@@ -24,7 +25,7 @@ from ...record import Array, Record, Units
 from ...signals.conditioning import conditioned
 from ...signals.stamps import rounded_grid
 from ...threads import alone
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 from ..dirty_axis import drawn, recorded
 from ..trials import of_model
 from . import calibration_oscillation as oscillation

@@ -15,12 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...figure import Figure
 from ...identification import METHODS
 from ...identification.result import Identification, Options
 from ...model import Model, build_model, term
 from ...record import Record
 from ...simulation import simulate
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 from ..by_scipy import fit_by_scipy
 
 __all__ = ["BENCHMARK"]

@@ -12,11 +12,12 @@ import time
 
 import numpy as np
 
+from ...figure import Figure
 from ...instrument import inspect
 from ...instrument.trials.faults import FAULTS
 from ...instrument.trials.score import false_alarms, hits, ordinary_alarms
 from ...record import Record
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 
 __all__ = ["BENCHMARK"]
 

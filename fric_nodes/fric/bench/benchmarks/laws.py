@@ -19,9 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ...figure import Figure
 from ...model import Model, Term, build_model, term
 from ...record import Array
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 from ..compiled_c import compile_loop, compiler
 
 __all__ = ["BENCHMARK", "CASES", "Case", "Run", "ours", "theirs"]

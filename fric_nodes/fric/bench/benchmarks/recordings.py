@@ -11,7 +11,8 @@ import numpy as np
 from ...bagio.encode import joint_state_messages, stamped_force_messages
 from ...bagio.read import read_record
 from ...bagio.write import BagWriter, Storage
-from ..benchmark import Benchmark, Figure
+from ...figure import Figure
+from ..benchmark import Benchmark
 
 __all__ = ["BENCHMARK"]
 

@@ -6,9 +6,10 @@ import time
 
 import numpy as np
 
+from ...figure import Figure
 from ...model import build_model, term
 from ...simulation import simulate
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 
 __all__ = ["BENCHMARK"]
 

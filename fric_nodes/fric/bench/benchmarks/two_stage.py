@@ -6,12 +6,13 @@ import time
 
 import numpy as np
 
+from ...figure import Figure
 from ...identification.dnlrx.cost import Cost
 from ...identification.dnlrx.fit import DECIMATION, DnlrxFit, fit_dnlrx
 from ...identification.dnlrx.linear import rows_of
 from ...record import Record
 from ...verification.amthor_guideway import recorded, wandering
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 
 __all__ = ["BENCHMARK"]
 

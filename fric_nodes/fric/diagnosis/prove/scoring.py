@@ -27,9 +27,9 @@ from typing import Any
 
 import numpy as np
 
-from ...bench.benchmark import Figure
 from ...effect import Place
 from ...effects import EFFECTS
+from ...figure import Figure
 from ...record import Array
 
 __all__ = ["Found", "Outcome", "Rate", "Score", "calibration_bins", "components_of", "energy_held", "outcome_of", "scored"]

@@ -41,16 +41,9 @@ from ..oscillation_effort import at_stamps
 from ..result import Identification, IdentificationError, Method, Options
 
 __all__ = [
-    "METHOD",
-    "MOST_RESTING",
-    "Forced",
-    "Harmonics",
-    "fit",
-    "forced_mechanics",
-    "forced_response",
-    "harmonics_of",
+    "METHOD", "MOST_RESTING", "Forced", "Harmonics", "fit", "forced_mechanics", "forced_response", "harmonics_of",
     "main_frequency",
-]
+]  # fmt: skip
 
 _FEWEST = 4  # periods
 _APART = 0.02  # relative difference of frequencies that tells a mass from a spring
@@ -387,8 +380,8 @@ def _result(
 
 def _note(run: Harmonics) -> str:
     left_out = f", {run.left_out:.2f} s before it was steady left out" if run.left_out > 0.0 else ""
-    size = float(np.mean(np.abs(run.position)))
-    return f"{run.source}: {run.means.shape[0]} periods at {run.frequency:.6g} rad/s, amplitude {size:.4g}{left_out}"
+    motion = f"{run.means.shape[0]} periods at {run.frequency:.6g} rad/s, amplitude {np.mean(np.abs(run.position)):.4g}"
+    return f"{run.source}: {motion}{left_out}"
 
 
 METHOD = Method(

@@ -34,7 +34,7 @@ from ..equations import Equations
 from ..force_errors import force_errors
 from ..free_parameters import FreeParameters
 from ..gauss_newton import Solution, minimise
-from ..multi_start import best_of, spread_starts
+from ..multi_start import Ends, best_of, spread_starts
 from ..multiple_shooting import Shooting, shooting
 from ..nested import best_with_nested
 from ..problem import Problem
@@ -236,8 +236,11 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     covariance, doubts = reconciled(best.model, free, covariance, begun)
     fitted = Fitted(best.model, free, covariance, found, [*messages, *doubts])
     result = concluded(METHOD, fitted, records, options, trouble)
-    if options.starts <= 1:
-        return result
+    return result if options.starts <= 1 else _with_starts(result, ends, free, covariance)
+
+
+def _with_starts(result: Identification, ends: Ends, free: FreeParameters, covariance: Array) -> Identification:
+    """``result`` with what the other starts came to."""
     fitted_errors = dict(zip(free.names, np.sqrt(np.diag(covariance)), strict=True))
     errors = np.array([fitted_errors.get(name, np.nan) for name in ends.names])
     doubt = ends.warning(errors)

@@ -283,7 +283,7 @@ def triangular(work: Any, columns: int, root: Any) -> None:
 
 
 @loop
-def correct(
+def correct(  # noqa: C901 - a compiled kernel
     mean: Any, root: Any, seen: int, rate: int, duration: float, n_theta: int, y: float, noise: float, limit: float,
     held: Any, forgotten: float, most: Any, information: Any, fade: float, smooth: Any, fresh: float, work: Any, gain: Any,
     out: Any,

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,9 +34,10 @@ from ...signals.stamps import evened
 from ..equations import Equations, equations
 from ..free_parameters import FreeParameters
 from ..methods.inverse_dynamics import regressors
-from ..rests import SLOW, Rests, at_rest, can_stand_for
+from ..rests import SLOW, can_stand_for
 from ..result import IdentificationError, Options
 from ..scoring import driving_force
+from .blocks import Block, Known
 from .estimate import Estimate, State, model_with, status_of
 
 __all__ = ["OnlineIdentifier"]
@@ -54,50 +54,6 @@ _OLD = 0.05  # of a block: what old information counts after a change
 _UNEXPLAINED = 5.0  # residuals of the old values, beside their usual root mean square, from which a row is of the new ones
 _SPREAD = 2  # rows over which the low-pass filter spreads a step
 _ROWS_PER_PARAMETER = 20  # behind what is called usual
-
-
-@dataclass(frozen=True)
-class _Known:
-    """What has been learnt until some moment."""
-
-    values: Array
-    information: Array
-    scores: Array
-    n_blocks: float
-    energy: float
-    lagged_energy: float
-    weight: float
-    last_residual: float
-    explained: float
-    samples_used: int
-
-
-@dataclass(eq=False)
-class _Block:
-    """The equations of one block: rows ``(n, n_parameters)``, the rest of shape ``(n,)``, and the two sample times [s].
-
-    Whether it rests in a row is judged beside the motion of all blocks kept, not of its own: ``sliding`` rows aren't at rest,
-    and into ``clear`` ones no rest reaches.
-    """
-
-    rows: Array
-    target: Array
-    velocity: Array
-    rests: Rests
-    row_time: float
-    sample_time: float
-    sliding: Mask
-    clear: Mask
-
-    def used(self, only_clear: bool) -> Mask:
-        """Rows to learn from."""
-        return self.clear if only_clear else self.sliding
-
-    def judge(self, rest: float) -> None:
-        """Say where it rests, when that is slower than ``rest`` [x/s] for a while."""
-        limit = max(rest, self.rests.noise)
-        self.sliding = ~at_rest(self.velocity, limit, self.row_time)
-        self.clear = self.sliding & self.rests.clear(limit)
 
 
 class OnlineIdentifier:
@@ -127,7 +83,7 @@ class OnlineIdentifier:
         n = len(self._free.names)
         self._values = self.structure.values[self._free.index]
         self._forget(n)
-        self._blocks: deque[_Block] = deque(maxlen=_BLOCKS_KEPT)
+        self._blocks: deque[Block] = deque(maxlen=_BLOCKS_KEPT)
         self._rest, self._only_clear = 0.0, True
         self.samples_rejected = 0
         self._clear_buffer()
@@ -139,7 +95,7 @@ class OnlineIdentifier:
         self._n_blocks = 0.0
         self._energy = self._lagged_energy = self._weight = 0.0
         self._last_residual = 0.0
-        self._suspect: tuple[_Block, _Known] | None = None
+        self._suspect: tuple[Block, Known] | None = None
         self._explained = 0.0
         self.samples_used = 0
 
@@ -233,7 +189,7 @@ class OnlineIdentifier:
         force = driving_force(self.structure, found)
         every = np.ones_like(found.sliding)
         target = force - columns @ held
-        block = _Block(columns[:, self._free.index], target, found.velocity, found.rests, row_time, sample_time, every, every)
+        block = Block(columns[:, self._free.index], target, found.velocity, found.rests, row_time, sample_time, every, every)
         self._blocks.append(block)
         rest = self._rest_limit()
         anew = rest > _GROWN * self._rest
@@ -263,7 +219,7 @@ class OnlineIdentifier:
         clear, sliding = (np.concatenate(masks) for masks in zip(*((b.clear, b.sliding) for b in self._blocks), strict=True))
         return can_stand_for(clear, sliding, np.concatenate([block.velocity for block in self._blocks]))
 
-    def _learn_block(self, block: _Block) -> bool:
+    def _learn_block(self, block: Block) -> bool:
         """Learn from the rows of ``block`` in which the joint slides."""
         rows = block.used(self._only_clear)
         suspicious = self._suspicious(block.rows[rows], block.target[rows])
@@ -274,7 +230,7 @@ class OnlineIdentifier:
             self._suspect = (block, self._known_so_far()) if suspicious else None
         return self._learn_rows(block, rows)
 
-    def _learn_rows(self, block: _Block, rows: Mask) -> bool:
+    def _learn_rows(self, block: Block, rows: Mask) -> bool:
         """Learn from these ``rows`` of ``block``."""
         forgetting = math.exp(-block.row_time / self.forgetting_time) if math.isfinite(self.forgetting_time) else 1.0
         score = np.zeros(block.rows.shape[1])
@@ -303,8 +259,8 @@ class OnlineIdentifier:
         self._explained += _USUAL * (min(explained, _CHANGED * usual) - self._explained)
         return bool(explained > _CHANGED * usual)
 
-    def _known_so_far(self) -> _Known:
-        return _Known(
+    def _known_so_far(self) -> Known:
+        return Known(
             self._values,
             self._information.copy(),
             self._scores,
@@ -317,7 +273,7 @@ class OnlineIdentifier:
             self.samples_used,
         )
 
-    def _begin_anew(self, block: _Block, before: _Known) -> None:
+    def _begin_anew(self, block: Block, before: Known) -> None:
         """Let go what was known ``before``, and learn again from ``block``, the first after a change of the axis."""
         rows = block.used(self._only_clear)
         residual = block.target - block.rows @ before.values

@@ -11,6 +11,7 @@ import math
 import time
 from typing import Protocol
 
+from fric.experiment import answering
 from fric.experiment.motion import Drive, ExperimentError, Law, Sample
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
@@ -19,9 +20,9 @@ from rclpy.task import Future
 
 from fric_interfaces.msg import Reference
 
-from .base import LoopNode
 from .convert import set_stamp
 from .forces import ForcePublisher
+from .loop import LoopNode
 from .qos import SAMPLES
 
 __all__ = ["ControllerDrive", "ForceDrive", "Output"]
@@ -32,18 +33,12 @@ __all__ = ["ControllerDrive", "ForceDrive", "Output"]
 _ASK_AGAIN = 1.0  # [s]
 
 
-class Output(Protocol):
-    """Where the drives of an experiment go."""
+class Output(answering.Output, Protocol):
+    """Where the drives of an experiment go, on topics."""
 
     @property
     def publisher(self) -> Publisher:
         """The one whose audience has to be there."""
-
-    def give(self, stamp: int, drive: Drive, sample: Sample) -> float | None:
-        """Answer ``sample`` of ``stamp`` [ns] with ``drive``: the force [F] (NaN: not known), or None when it has to wait."""
-
-    def zero(self, stamp: int, sample: Sample) -> None:
-        """Answer ``sample`` while something is being waited for: no force that isn't there already."""
 
     def repeat(self) -> None:
         """Give the last answer again."""

@@ -6,17 +6,17 @@ follow from messages arriving in the order in which they were sent:
 
 - a stamp that was answered already is a repetition;
 - a message with an earlier stamp than the newest one means that its sender goes through the samples again from there, so that
-what
-  it sent for that stamp and later ones no longer counts (:class:`Stream`).
+  what it sent for that stamp and later ones no longer counts (:class:`Stream`).
 """
 
 from __future__ import annotations
 
 from typing import Generic, TypeVar
 
-__all__ = ["Answers", "Stream"]
+__all__ = ["Answers", "Matching", "Stream"]
 
 Value = TypeVar("Value")
+State = TypeVar("State")
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
 
@@ -90,3 +90,36 @@ class Answers(Generic[Question, Answer]):
         """Forget everything."""
         self._given.clear()
         self._newest = -1
+
+
+class Matching(Generic[State]):
+    """A state that waits for one number from each of several senders, all with the state's own stamp.
+
+    Args:
+        senders: number of senders.
+    """
+
+    def __init__(self, senders: int) -> None:
+        self._streams: list[Stream[float]] = [Stream() for _ in range(senders)]
+        self._pending: tuple[int, State] | None = None
+
+    def put(self, sender: int, stamp: int, value: float) -> None:
+        """Take in ``value`` of sender number ``sender`` for the sample ``stamp`` [ns]."""
+        self._streams[sender].put(stamp, value)
+
+    def ask(self, stamp: int, state: State) -> None:
+        """``state`` of the sample ``stamp`` [ns] waits from now on, instead of an earlier one."""
+        self._pending = stamp, state
+
+    def complete(self) -> tuple[State, list[float]] | None:
+        """The state that waits and the senders' numbers; None as long as one is missing."""
+        if self._pending is None:
+            return None
+        stamp, state = self._pending
+        values = [value for stream in self._streams if (value := stream.get(stamp)) is not None]
+        if len(values) < len(self._streams):
+            return None
+        self._pending = None
+        for stream in self._streams:
+            stream.forget_before(stamp)
+        return state, values

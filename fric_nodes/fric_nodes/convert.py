@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from builtin_interfaces.msg import Time
 from fric.effects import by_name
@@ -13,11 +13,15 @@ from fric.plants import PLANTS
 from fric.record import Units
 from sensor_msgs.msg import JointState
 
-from fric_interfaces.msg import FrictionModel, FrictionParameter, FrictionTerm
+from fric_interfaces.msg import FrictionEstimate, FrictionModel, FrictionParameter, FrictionTerm
+
+if TYPE_CHECKING:
+    from fric.identification.online.estimate import Estimate  # takes a while to import, and most nodes need none of it
 
 __all__ = [
     "JointSample",
     "MessageError",
+    "estimate_to_message",
     "from_seconds",
     "joint_sample",
     "model_from_message",
@@ -108,6 +112,25 @@ def model_to_message(model: Model, stamp: int) -> FrictionModel:
         entry(held.effect.id, held.effect.law, f"{prefix}.", held.effect.parameters, held.values)
         for prefix, held in zip(model.prefixes, model.terms, strict=True)
     ]
+    return message
+
+
+def estimate_to_message(estimate: Estimate, structure: Model, joint: str, stamp: int) -> FrictionEstimate:
+    """The estimate of ``joint`` as a message; ``stamp`` [ns] is that of the newest sample."""
+    message = FrictionEstimate(joint=joint)
+    set_stamp(message.header.stamp, stamp)
+    message.header.frame_id = joint
+    message.names = list(estimate.names)
+    message.units = [structure.unit(name) for name in estimate.names]
+    message.values = estimate.values.tolist()
+    message.standard_errors = estimate.standard_errors.tolist()
+    message.covariance = estimate.covariance.ravel().tolist()
+    message.excited = estimate.excited.tolist()
+    message.residual_rms = float(estimate.residual_rms)
+    message.samples_used = estimate.samples_used
+    message.samples_rejected = estimate.samples_rejected
+    message.state = int(estimate.state)
+    message.status = estimate.status
     return message
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from .qos import DIAGNOSTICS
@@ -99,39 +100,50 @@ class Reporter:
         node: whose they are.
         period: between two reports [s].
         deadlines: its periodic activity.
-        counters: what it counts; a name that starts with ``refused`` makes the report a warning while it grows.
+        counters: what it counts; one whose name starts with ``refused`` or ``watchdog`` is a trouble while it grows.
+        verdict: level and text of a report, from the troubles since the last one.
         more: further entries, asked for at every report.
     """
 
     def __init__(
-        self, node: Node, period: float, deadlines: Deadlines, counters: Counter[str], more: Callable[[], Mapping[str, str]]
+        self,
+        node: Node,
+        period: float,
+        deadlines: Deadlines,
+        counters: Counter[str],
+        verdict: Callable[[Sequence[str]], tuple[bytes, str]],
+        more: Callable[[], Mapping[str, object]],
     ) -> None:
         self._node = node
         self._deadlines = deadlines
         self._counters = counters
-        self._more = more
+        self._verdict = verdict
+        self.more = more
         self._before: Counter[str] = Counter()
         self._misses_before = 0
         # One topic for the whole graph, as diagnostic aggregators expect it.
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", DIAGNOSTICS)
-        self._timer = node.create_timer(period, self.publish)
+        # The node's own clock may be simulated, and stand still.
+        self._timer = node.create_timer(period, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def publish(self) -> None:
-        """Publish one report now."""
+    def _troubles(self) -> list[str]:
         grown = [name for name, count in self._counters.items() if count > self._before[name]]
         missed = self._deadlines.misses - self._misses_before
         self._before = Counter(self._counters)
         self._misses_before = self._deadlines.misses
-        values = {**self._deadlines.report(), **{name: str(n) for name, n in self._counters.items()}, **self._more()}
         troubles = [name for name in grown if name.startswith(("refused", "watchdog"))]
-        if missed:
-            troubles.append(f"{missed} deadlines missed")
+        return [*troubles, f"{missed} deadlines missed"] if missed else troubles
+
+    def publish(self) -> None:
+        """Publish one report now."""
+        level, text = self._verdict(self._troubles())
+        values = {**self._deadlines.report(), **self._counters, **self.more()}
         status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK,
+            level=level,
             name=self._node.get_fully_qualified_name().lstrip("/"),
-            message=", ".join(troubles) or "running",
+            message=text,
             hardware_id="",
-            values=[KeyValue(key=key, value=value) for key, value in values.items()],
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
         message = DiagnosticArray(status=[status])
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(time.time_ns(), 1_000_000_000)

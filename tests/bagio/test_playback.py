@@ -6,7 +6,7 @@ import time
 
 import pytest
 from fric.bagio import Raw
-from fric_nodes.nodes.playback import Due, Pace, schedule
+from fric.bagio.playback import Due, Pace, schedule
 
 SECOND = 1_000_000_000
 STAMPED = "sensor_msgs/msg/JointState"

@@ -7,29 +7,21 @@ In wall time a force is a ``std_msgs/Float64``; in lock-step, or where a node is
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
+from fric.control.reference import ReferencePoint
 from std_msgs.msg import Float64
 
 from fric_interfaces.msg import Reference, StampedForce
 
-from .base import LoopNode
 from .convert import MessageError, nanoseconds, set_stamp
+from .loop import LoopNode
 from .parameters import NodeParameter
 from .qos import SAMPLES
 
-__all__ = ["STAMPED", "ForcePublisher", "ReferencePoint", "force_in", "force_type", "reference_in"]
+__all__ = ["STAMPED", "ForcePublisher", "force_in", "force_type", "reference_in"]
 
 STAMPED = NodeParameter("stamped", False, "wall time: use StampedForce instead of Float64 for forces; lock-step always does")
-
-
-class ReferencePoint(NamedTuple):
-    """A reference: stamp [ns], position [x], velocity [x/s], acceleration [x/s^2]."""
-
-    stamp: int
-    position: float
-    velocity: float
-    acceleration: float
 
 
 def reference_in(message: Reference) -> ReferencePoint:

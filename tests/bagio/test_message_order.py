@@ -3,7 +3,7 @@ from __future__ import annotations
 import random
 import struct
 
-from fric_nodes.nodes.message_order import ReceiveOrder, StampOrder, TopicIntake, header_stamp
+from fric.bagio.message_order import ReceiveOrder, StampOrder, TopicIntake, header_stamp
 
 MS = 1_000_000
 

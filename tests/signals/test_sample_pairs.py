@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import math
 
-from fric_nodes.nodes.sample_pairs import EffortPairing, Sample
+from fric.signals.sample_pairs import EffortPairing, Sample
 
 NOTHING = math.nan
 

@@ -13,11 +13,11 @@ from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from fric.bagio.topics import Raw
 from rosbags.interfaces import Qos
 from rosbags.rosbag2 import Reader, ReaderError
 
 from .message_order import header_stamp
+from .topics import Raw
 
 __all__ = ["Due", "Pace", "recorded_qos", "schedule"]
 

@@ -1,0 +1,85 @@
+"""The main function of every node.
+
+rclpy's own signal handlers shut the context down at once, and with it the queues that are still to be emptied, and an exception
+out of a handler may interrupt a write half-way. Here a signal only sets a flag once the node is made. The flag is looked at
+between two rounds of the executor; then the node closes in its own time, with a graph that still works. While the node is being
+made, which may take a compilation, a signal breaks that off.
+"""
+
+from __future__ import annotations
+
+import gc
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from types import FrameType
+
+import rclpy
+from fric.errors import InputError
+from rclpy.signals import SignalHandlerOptions
+
+from .base import FricNode
+
+__all__ = ["run"]
+
+# [s] at most between a signal and the end of the executor's round; without a limit rclpy 7.1's events executor waits for ever
+_LOOK = 0.1
+
+
+class _Stop:
+    """What SIGINT and SIGTERM have asked for."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self.made = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
+        self.asked = True
+        if not self.made:
+            raise KeyboardInterrupt
+
+
+def run(kind: Callable[..., FricNode], args: list[str] | None = None) -> None:
+    """Make the node and serve it until it is done, or SIGINT or SIGTERM comes: exit status 0.
+
+    Args:
+        kind: the node's class.
+        args: ROS arguments; those of the process when None.
+
+    An input that can't be used is one line, which begins with the node's name, and exit status 2.
+    """
+    stop = _Stop()
+    name = kind.__name__.removesuffix("Node").lower()
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = kind()
+        stop.made = True
+        _serve(node, stop)
+    except InputError as error:
+        sys.stderr.write(f"{name}: {' '.join(str(error).split())}\n")
+        sys.exit(2)
+    except BaseException:
+        # A signal may also show as a compilation that was broken off.
+        if stop.made or not stop.asked:
+            raise
+    finally:
+        stop.made = True
+        rclpy.try_shutdown()
+
+
+def _serve(node: FricNode, stop: _Stop) -> None:
+    executor = node.make_executor()
+    with ExitStack() as ending:
+        ending.callback(node.destroy_node)
+        ending.callback(executor.shutdown)
+        ending.callback(node.close)
+        executor.add_node(node)
+        node.begin()
+        # What was imported stays: without this, the first full collection looks at all of it and takes 100 ms and more.
+        gc.collect()
+        gc.freeze()
+        while not (stop.asked or node.done):
+            executor.spin_once(timeout_sec=_LOOK)
