@@ -2,7 +2,7 @@
 
 Each seed draws an axis (its mass, its friction, its scale), how it is moved, its controller, its encoder, its noise and its
 rate. The truth is integrated with several times as many steps as a simulation takes. Controllers are PD laws that read the
-position as the encoder gives it.
+position as the encoder gives it, and have the gain margin that a servo is given.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import expm
 
 from ...excitation import EXCITATIONS
 from ...excitation_kind import Points
@@ -21,6 +22,8 @@ from ...simulation import Simulator, substeps
 __all__ = ["AXES", "CLEAN_ONLY", "MOTIONS", "Raw", "Rig", "draw_rig", "record_of", "run_rig"]
 
 _FINER = 2
+_SOFTER = 0.9  # step of the search for a bandwidth that the sample time allows; numerical
+_GAIN_MARGIN = 2.0  # 6 dB, the usual least margin of a servo loop
 
 AXES = ("rigid", "stribeck", "bristles", "two masses")
 """Axes that faults are put into."""
@@ -144,11 +147,13 @@ def draw_rig(seed: int, axis: str, motion: str, *, scaled: bool = True) -> Rig:
         # Of a free decay, what deflects the spring by some centimetres; otherwise several times its friction.
         size = 0.03 * truth.value("stiffness.stiffness") if "stiffness.stiffness" in truth.names else 3.0 * coulomb
         wanted = Points(*(size * part for part in wanted))
-    gains = _gains(motion, mass, coulomb, float(np.ptp(wanted.position)), random)
+    stiffness, damping = _gains(motion, mass, coulomb, float(np.ptp(wanted.position)), random)
+    while output == "reference" and not _settles(truth, (stiffness, damping), sample_time):
+        stiffness, damping = _SOFTER**2 * stiffness, _SOFTER * damping
     nominal = build_model("rigid", {"mass": mass}, [term("coulomb", force=coulomb), term("viscous", coefficient=viscous)])
     scale = (float(random.choice([1.0, 10.0])), float(random.choice([1.0, 0.02, 30.0]))) if scaled else (1.0, 1.0)
     return Rig(
-        truth, nominal, axis, motion, wanted, output == "force", gains, sample_time,
+        truth, nominal, axis, motion, wanted, output == "force", (stiffness, damping), sample_time,
         resolution=float(random.choice([5e-7, 2e-6])), force_noise=float(random.uniform(0.005, 0.03)) * coulomb,
         hold=str(random.choice(["following", "linear"])), scale=scale,
     )  # fmt: skip
@@ -162,6 +167,36 @@ def _gains(motion: str, mass: float, coulomb: float, travel: float, random: np.r
         # Pulled by a spring that gives way by a quarter of the pull.
         stiffness = 2.0 * coulomb / (0.25 * MOTIONS[motion][1]["peak"])
     return stiffness, 1.4 * math.sqrt(mass * stiffness)
+
+
+def _settles(truth: Model, gains: tuple[float, float], h: float) -> bool:
+    """Whether the loop has its gain margin without friction: P and D of the last two samples, held over ``h`` [s].
+
+    The loop's state is that of the masses and the position at the sample before. With a transmission that gives way the drive
+    moves the motor's mass alone at once, so that a damping which suits the whole mass can make the motor vibrate.
+    """
+    mass = truth.value("mass")
+    if "compliance.stiffness" in truth.names:
+        share = truth.value("load_share")
+        masses = mass * np.array([1.0 - share, share])
+        link = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        spring, loss = (truth.value(f"compliance.{name}") * link for name in ("stiffness", "damping"))
+    else:
+        masses, spring, loss = np.array([mass]), np.zeros((1, 1)), np.zeros((1, 1))
+    n = masses.size
+    # Positions, velocities, and the force as a state that stays.
+    flow = np.zeros((2 * n + 1, 2 * n + 1))
+    flow[:n, n : 2 * n] = np.eye(n)
+    flow[n : 2 * n, :n], flow[n : 2 * n, n : 2 * n] = -spring / masses[:, None], -loss / masses[:, None]
+    flow[n, -1] = 1.0 / masses[0]
+    step = expm(flow * h)
+    p, d = (_GAIN_MARGIN * gain for gain in gains)
+    loop = np.zeros((2 * n + 1, 2 * n + 1))
+    loop[: 2 * n, : 2 * n] = step[: 2 * n, : 2 * n]
+    loop[: 2 * n, 0] -= (p + d / h) * step[: 2 * n, -1]
+    loop[: 2 * n, -1] = d / h * step[: 2 * n, -1]
+    loop[-1, 0] = 1.0
+    return bool(np.max(np.abs(np.linalg.eigvals(loop))) < 1.0)
 
 
 def run_rig(rig: Rig) -> Raw:
