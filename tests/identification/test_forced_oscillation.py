@@ -12,9 +12,8 @@ from fric.identification.methods.forced_oscillation import (
     Forced,
     forced_mechanics,
     forced_response,
-    harmonics_of,
-    main_frequency,
 )
+from fric.identification.oscillation.harmonics import harmonics_of, main_frequency
 from fric.identification.result import IdentificationError, Options
 from fric.identification.start import start_model
 from fric.model import Model

@@ -29,7 +29,7 @@ def test_clean_recordings_raise_no_alarm() -> None:
 
 def test_a_loop_at_its_margin_vibrates_faster_than_its_samples_show() -> None:
     rig = draw_rig(30_009, "two masses", "graded_rests")
-    # With about twice the damping that the rig is given: the motor's mass oscillates at 90 Hz, of which 400 Hz keep four samples.
+    # With about twice its damping the motor oscillates at 90 Hz, of which 400 Hz keep four samples.
     vibrating = replace(rig, gains=(3.5 * rig.gains[0], 1.9 * rig.gains[1]))
     verdicts = []
     for each in (rig, vibrating):

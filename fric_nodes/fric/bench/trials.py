@@ -18,10 +18,10 @@ from scipy.special import ndtri
 from ..figure import Figure
 from ..identification.calibration import Calibration
 from ..identification.result import Identification, IdentificationError
-from ..record import Array
+from ..record import Array, Record
 from ..threads import alone
 
-__all__ = ["SEEDS", "Finding", "count", "figures_of", "of_model", "over_interval"]
+__all__ = ["SEEDS", "Change", "Finding", "Listener", "as_it_is", "count", "figures_of", "of_model", "over_interval", "unheard"]
 
 SEEDS = range(20_000, 20_200)
 """Of the full counts; none of these experiments was looked at while the methods were made."""
@@ -32,6 +32,21 @@ _LOW, _HIGH = 0.85, 0.95  # share of the intervals of 90 % that should hold the 
 
 Finding = Mapping[str, tuple[float, float]]
 """By name, the estimate less the truth, and the standard error."""
+
+Change = Callable[[Record], Record]
+"""Made to a recording before it is fitted."""
+
+Listener = Callable[[Identification], None]
+"""Is given what a trial identified."""
+
+
+def as_it_is(record: Record) -> Record:
+    """``record``."""
+    return record
+
+
+def unheard(_: Identification) -> None:
+    """Nothing is done with what was identified."""
 
 
 def over_interval(estimate: float, truth: float, half_width: float) -> tuple[float, float]:

@@ -11,8 +11,9 @@ from scipy import signal
 
 from ..errors import InputError
 from ..identification import METHODS
-from ..identification.methods.forced_oscillation import MOST_RESTING, harmonics_of
+from ..identification.methods.forced_oscillation import MOST_RESTING
 from ..identification.methods.log_decrement import log_decrement
+from ..identification.oscillation.harmonics import harmonics_of
 from ..identification.oscillation.recording import find_oscillation
 from ..identification.oscillation_effort import at_stamps
 from ..identification.result import Identification, Options

@@ -7,19 +7,19 @@ experiment is four recordings of one pendulum under four position gains.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
 from ...figure import Figure
 from ...identification import METHODS
-from ...identification.result import Identification, Options
+from ...identification.result import Options
 from ...model import Model, build_model, term
 from ...record import Record, Units
 from ...verification.free_oscillation_reference import INERTIA, PENDULUMS, Pendulum, recorded, swing
 from ..benchmark import Benchmark
-from ..trials import SEEDS, Finding, count, figures_of, of_model
+from ..trials import SEEDS, Change, Finding, Listener, as_it_is, count, figures_of, of_model, unheard
 
 __all__ = ["BENCHMARK", "CASES", "free", "parametric"]
 
@@ -42,14 +42,6 @@ def _structure(inertia: float) -> Model:
     return build_model("rigid", {"mass": inertia}, terms, units=Units("rad", "N m"))
 
 
-def _as_it_is(record: Record) -> Record:
-    return record
-
-
-def _unheard(_: Identification) -> None:
-    pass
-
-
 def _release(pendulum: Pendulum, seed: int, number: int = 0) -> Record:
     """A recording of ``pendulum`` from a deflection of its own."""
     start = float(np.random.default_rng([seed, number, 1]).uniform(1.1, 2.0))
@@ -59,8 +51,8 @@ def _release(pendulum: Pendulum, seed: int, number: int = 0) -> Record:
 def free(
     method: str,
     seed: int,
-    change: Callable[[Record], Record] = _as_it_is,
-    heard: Callable[[Identification], None] = _unheard,
+    change: Change = as_it_is,
+    heard: Listener = unheard,
 ) -> Finding:
     """One release of one of the four pendulums, fitted by ``method`` with the inertia held.
 
@@ -95,9 +87,7 @@ def _under_gain(gain: float) -> Pendulum:
     )
 
 
-def parametric(
-    seed: int, change: Callable[[Record], Record] = _as_it_is, heard: Callable[[Identification], None] = _unheard
-) -> Finding:
+def parametric(seed: int, change: Change = as_it_is, heard: Listener = unheard) -> Finding:
     """Four releases under four position gains, fitted together; the inertia is free. See :func:`free`."""
     records = [change(_release(_under_gain(gain), seed, number)) for number, gain in enumerate(_GAINS)]
     options = Options(gains=tuple((gain, 0.0) for gain in _GAINS))

@@ -24,7 +24,7 @@ from ...record import Array, Record, Units
 from ...simulation import simulate
 from ...verification import pneumatic_reference as reference
 from ..benchmark import Benchmark
-from ..trials import SEEDS, Finding, count, figures_of, over_interval
+from ..trials import SEEDS, Change, Finding, Listener, as_it_is, count, figures_of, over_interval, unheard
 
 __all__ = ["BENCHMARK", "identified", "ratio", "trial"]
 
@@ -56,20 +56,27 @@ def _recordings(seed: int, own: float) -> list[reference.Slip]:
     return found
 
 
-def identified(slips: Sequence[reference.Slip]) -> TensorProductIdentification:
-    """Tensor-product friction from ``slips``."""
+def identified(slips: Sequence[reference.Slip], change: Change = as_it_is) -> TensorProductIdentification:
+    """Tensor-product friction from ``slips``, each recording changed before."""
     structure = start_model(["coulomb"], "axis", Units()).with_value("mass", reference.MASS)
-    found = METHODS["tensor-product"].fit(structure, [_record(slip) for slip in slips], Options())
+    found = METHODS["tensor-product"].fit(structure, [change(_record(slip)) for slip in slips], Options())
     assert isinstance(found, TensorProductIdentification)
     return found
 
 
-def trial(seed: int) -> Finding:
-    """The grid point nearest to each of some speeds, on either branch."""
+def trial(seed: int, change: Change = as_it_is, heard: Listener = unheard) -> Finding:
+    """The grid point nearest to each of some speeds, on either branch.
+
+    Args:
+        seed: of friction and noise.
+        change: made to each recording before it is fitted.
+        heard: is given the result.
+    """
     truth = _truth()
     top = int(np.argmax(truth.velocity))
     moving = truth.velocity > 0.0
-    found = identified(_recordings(seed, _OWN))
+    found = identified(_recordings(seed, _OWN), change)
+    heard(found)
     result = {}
     for up, name in ((True, "speeding up"), (False, "slowing down")):
         part = moving & ((np.arange(moving.shape[0]) <= top) == up)

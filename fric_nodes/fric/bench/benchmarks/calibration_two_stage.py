@@ -23,7 +23,7 @@ from ...identification.result import Options
 from ...model import Model, build_model, term
 from ...record import Array, Record
 from ..benchmark import Benchmark
-from ..trials import SEEDS, Finding, count, figures_of, of_model
+from ..trials import SEEDS, Change, Finding, Listener, as_it_is, count, figures_of, of_model, unheard
 
 __all__ = ["BENCHMARK", "LIMITS", "PACES", "SPRINGS", "recorded", "structure", "trial", "truth"]
 
@@ -129,9 +129,17 @@ def truth() -> dict[str, float]:
     return found | {f"presliding.limit_{k}": value for k, value in enumerate(LIMITS.tolist(), start=1)}
 
 
-def trial(least: float, seed: int) -> Finding:
-    """One recording, its three springs given."""
-    found = METHODS["two-stage"].fit(structure(), [recorded(seed, least)], Options(decimation=25))
+def trial(least: float, seed: int, change: Change = as_it_is, heard: Listener = unheard) -> Finding:
+    """One recording, its three springs given.
+
+    Args:
+        least: duration of a stroke at least [s].
+        seed: of motion and noise.
+        change: made to the recording before it is fitted.
+        heard: is given the result.
+    """
+    found = METHODS["two-stage"].fit(structure(), [change(recorded(seed, least))], Options(decimation=25))
+    heard(found)
     return of_model(found, truth())
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +28,12 @@ from ...signals.stamps import rounded_grid
 from ...threads import alone
 from ..benchmark import Benchmark
 from ..dirty_axis import drawn, recorded
-from ..trials import of_model
+from ..trials import Finding, of_model
+from . import calibration_forced as forced
 from . import calibration_oscillation as oscillation
 from . import calibration_static as static
+from . import calibration_tensor_product as tensor_product
+from . import calibration_two_stage as two_stage
 
 __all__ = ["BENCHMARK", "CASES", "SEEDS", "dirtied", "figures"]
 
@@ -79,11 +83,16 @@ def _of_axis(method: str, seed: int) -> Answer:
     return of_model(found, axis.named()), _warns(found)
 
 
-def _of_oscillation(method: str, seed: int) -> Answer:
+def _of_experiment(trial: Callable[..., Finding], seed: int) -> Answer:
     change = partial(dirtied, random=np.random.default_rng(seed + 5_000_000))
-    trial = oscillation.parametric if method == "parametric-oscillation" else partial(oscillation.free, method)
     heard: list[bool] = []
     return trial(seed, change=change, heard=lambda found: heard.append(_warns(found))), any(heard)
+
+
+def _springs(seed: int, **told: Any) -> Finding:
+    """Strokes of each pace in turn."""
+    paces = tuple(two_stage.PACES.values())
+    return two_stage.trial(paces[seed % len(paces)], seed, **told)
 
 
 def _of_ladder(seed: int) -> Answer:
@@ -97,9 +106,17 @@ def _warns(found: Identification) -> bool:
     return bool(found.warnings) or "not " in found.status
 
 
+_EXPERIMENTS: dict[str, Callable[..., Finding]] = {
+    **{method: partial(oscillation.free, method) for method in oscillation.CASES},
+    "parametric-oscillation": oscillation.parametric,
+    "forced-oscillation": forced.trial,
+    "two-stage": _springs,
+    "tensor-product": tensor_product.trial,
+}
+
 CASES: dict[str, Callable[[int], Answer]] = {
     **{name: partial(_of_axis, name) for name in ("inverse-dynamics", "output-error", "prediction-error")},
-    **{name: partial(_of_oscillation, name) for name in ("log-decrement", "hilbert", "wavelet", "parametric-oscillation")},
+    **{method: partial(_of_experiment, trial) for method, trial in _EXPERIMENTS.items()},
     "static-map": _of_ladder,
 }
 """A trial for each method."""

@@ -27,8 +27,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import signal
-from scipy.optimize import minimize_scalar
 
 from ...method_settings import FILTER
 from ...model import Model
@@ -37,19 +35,23 @@ from ..conclusion import Fitted, concluded
 from ..equations import equations
 from ..free_parameters import FreeParameters
 from ..mechanics import Mechanics
+from ..oscillation.harmonics import Harmonics, Held, harmonics_of
 from ..oscillation_effort import at_stamps
 from ..result import Identification, IdentificationError, Method, Options
 
 __all__ = [
-    "METHOD", "MOST_RESTING", "Forced", "Harmonics", "fit", "forced_mechanics", "forced_response", "harmonics_of",
-    "main_frequency",
-]  # fmt: skip
+    "METHOD",
+    "MOST_RESTING",
+    "Forced",
+    "fit",
+    "forced_mechanics",
+    "forced_response",
+]
 
-_FEWEST = 4  # periods
 _APART = 0.02  # relative difference of frequencies that tells a mass from a spring
-_STEADY = 0.02  # relative difference of a period's amplitude from the later ones' that counts as steady
 MOST_RESTING = 0.05
 """Part of the time at rest from which on a forced run is refused: it leaves sgn(v) open."""
+_PASSES = 3  # numerical: each takes the error that a rest leaves down to its own share of the period
 _COLUMNS = ("mass", "viscous.coefficient", "stiffness.stiffness", "coulomb.force", "asymmetry.coefficient", "constant")
 
 
@@ -70,128 +72,6 @@ class Forced:
     stiff: float
     lossy: float
     covariance: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Harmonics:
-    """Means and first harmonics of the steady periods of one run, each of shape ``(n_periods,)``, complex where a harmonic.
-
-    Attributes:
-        frequency: w [rad/s].
-        force: F_1 [F].
-        position: Q_1 [x].
-        sign: S_1 [1].
-        speed: V_1 [x/s].
-        means: of force, position, sgn(v) and |v|, shape ``(n_periods, 4)``.
-        resting: part of the time in which the body rests [1].
-        source: the recording's file.
-        left_out: time before it was steady [s].
-    """
-
-    frequency: float
-    force: np.ndarray
-    position: np.ndarray
-    sign: np.ndarray
-    speed: np.ndarray
-    means: Array
-    resting: float
-    source: str
-    left_out: float
-
-
-def main_frequency(record: Record) -> float:
-    """Frequency of the strongest line in the position [rad/s], refined by least squares.
-
-    Raises:
-        IdentificationError: the joint doesn't move, or moves for less than two periods of it.
-    """
-    even = record.uniform()
-    # A transient swings at another frequency: it is the later half that counts.
-    even = even.slice(even.n_samples // 2, even.n_samples)
-    position = even.position - np.mean(even.position)
-    if not np.any(position):
-        raise IdentificationError(record.source, "the joint does not move", "force it harder")
-    spectrum = np.abs(np.fft.rfft(position * np.hanning(position.shape[0])))
-    line = 2.0 * np.pi / even.duration
-    peak = int(np.argmax(spectrum[1:])) + 1
-    if peak < 2:
-        raise IdentificationError(record.source, "shorter than two periods of its oscillation", "record for longer")
-
-    def left(frequency: float) -> float:
-        angle = frequency * even.time
-        columns = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
-        answer, *_ = np.linalg.lstsq(columns, position, rcond=None)
-        return float(np.sum((position - columns @ answer) ** 2))
-
-    found = minimize_scalar(left, bounds=((peak - 1.0) * line, (peak + 1.0) * line), method="bounded", options={"xatol": 1e-9})
-    return float(found.x)
-
-
-def harmonics_of(record: Record, frequency: float | None = None) -> Harmonics:
-    """The steady periods of a forced run.
-
-    Args:
-        record: of one run; a transient at its beginning is left out.
-        frequency: of the force [rad/s]; None: the strongest line.
-
-    Raises:
-        IdentificationError: fewer than four steady periods, or the body rests in each of them.
-    """
-    even = at_stamps(record.uniform())
-    w = main_frequency(even) if frequency is None else frequency
-    step = even.sample_time
-    period = 2.0 * np.pi / w
-    n_periods = int(even.duration / period)
-    if n_periods < _FEWEST:
-        raise IdentificationError(
-            record.source, f"{n_periods} periods of the force, at least {_FEWEST} are needed", "record for longer"
-        )
-    if period / step < 20.0:
-        raise IdentificationError(
-            record.source, f"sampled too slowly: {period / step:.3g} samples in a period", f"record at {20.0 / period:.3g} Hz"
-        )
-    width = max(int(period / step / 24.0) | 1, 5)
-    velocity = np.asarray(signal.savgol_filter(even.position, width, 2, deriv=1, delta=step))
-    noise = 1.4826 * float(np.median(np.abs(np.diff(even.position, 2)))) / np.sqrt(6.0)
-    slow = max(0.01 * float(np.max(np.abs(velocity))), 4.0 * noise / (step * width))
-    smooth = np.clip(velocity / slow, -1.0, 1.0)
-    signals = np.stack([even.effort, even.position, smooth, np.abs(velocity)], axis=1)
-    # From the end backwards, so that the last periods are whole; a grid of their own makes the sums exact.
-    per = int(np.ceil(period / step))
-    end = even.time[-1]
-    angle = 2.0 * np.pi * np.arange(per) / per
-    lines, means, still = [], [], []
-    for number in range(n_periods, 0, -1):
-        at = end - number * period + angle / w
-        values = np.stack([np.interp(at, even.time, column) for column in signals.T], axis=1)
-        lines.append(2.0 * np.mean(values * np.exp(-1j * (w * at))[:, None], axis=0))
-        means.append(np.mean(values, axis=0))
-        still.append(float(np.mean(values[:, 3] < slow)))
-    found, mean = np.array(lines), np.array(means)
-    first = _first_steady(found[:, 1])
-    if n_periods - first < _FEWEST:
-        raise IdentificationError(
-            record.source,
-            f"only {n_periods - first} of {n_periods} periods are steady",
-            "wait until the oscillation is steady, and record some ten periods of it",
-        )
-    # Slower than a hundredth of the top speed for longer than a sine is, near its turns.
-    resting = float(np.mean(still[first:])) - 2.0 / np.pi * slow / float(np.max(np.abs(velocity)))
-    kept = found[first:]
-    if record.hold != "linear":
-        # A force held for a sample has sin(x)/x of its values' harmonic, and the mean of two of them cos(x), x = w h/2.
-        kept[:, 0] *= np.tan(0.5 * w * step) / (0.5 * w * step)
-    return Harmonics(
-        w, kept[:, 0], kept[:, 1], kept[:, 2], kept[:, 3], mean[first:], max(resting, 0.0), record.source,
-        first * period,
-    )  # fmt: skip
-
-
-def _first_steady(position: np.ndarray) -> int:
-    """Number of the first period from which the first harmonic stays what the second half has it."""
-    later = np.mean(position[position.shape[0] // 2 :])
-    away = np.flatnonzero(np.abs(position - later) > _STEADY * abs(later))
-    return int(away[-1]) + 1 if away.size else 0
 
 
 def forced_response(record: Record, frequency: float) -> Forced:
@@ -266,10 +146,15 @@ def _solved(columns: Array, data: Array, weight: Array, source: str) -> tuple[Ar
     return unit / size, inverse * max(apart, 1.0) ** 2, apart
 
 
-def _rows(run: Harmonics, gain: tuple[float, float], relaxed: float) -> tuple[Array, Array, Array]:
-    """Columns ``(3, 6)``, data and weights ``(3,)`` of one run: both parts of its dynamic stiffness, and its means."""
+def _rows(run: Harmonics, gain: tuple[float, float], relaxed: float, values: Array) -> tuple[Array, Array, Array]:
+    """Columns ``(3, 6)``, data and weights ``(3,)`` of one run: both parts of its dynamic stiffness, and its means.
+
+    ``values``, shape ``(6,)``, are those found before, or 0: with them friction's share is taken off each period, so that
+    periods differ by what its harmonics are off by as well.
+    """
     w, q = run.frequency, np.abs(run.position)
-    ratio, covariance = _mean_of(run.force / run.position)
+    each = run.force / run.position
+    ratio = complex(np.mean(each))
     sign, speed = complex(np.mean(run.sign / run.position)), complex(np.mean(run.speed / run.position))
     force, position, sign_mean, speed_mean = np.mean(run.means, axis=0)
     size = float(np.mean(q))
@@ -277,8 +162,9 @@ def _rows(run: Harmonics, gain: tuple[float, float], relaxed: float) -> tuple[Ar
     constant = np.array([0.0, 0.0, position - relaxed, sign_mean, speed_mean, 1.0]) / size
     columns = np.stack([harmonic.real, harmonic.imag, constant])
     data = np.array([ratio.real - gain[0], ratio.imag - gain[1] * w, (force - gain[0] * position) / size])
-    n = run.means.shape[0]
-    drift = float(np.var(run.means[:, 0], ddof=1)) / n / size**2
+    left = run.means[:, 0] - (gain[0] + values[2]) * run.means[:, 1] - run.means[:, 2:] @ values[3:5]
+    _, covariance = _mean_of(each - values[3] * run.sign / run.position - values[4] * run.speed / run.position)
+    drift = float(np.var(left, ddof=1)) / run.means.shape[0] / size**2
     variance = np.array([covariance[0, 0], covariance[1, 1], drift + float(np.trace(covariance)) * 0.25])
     return columns, data, 1.0 / np.sqrt(variance)
 
@@ -337,12 +223,56 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
                 "force it harder, or at a higher frequency",
             )
     relaxed = structure.value("stiffness.position") if "stiffness.position" in structure.names else 0.0
-    parts = [_rows(*each, relaxed) for each in zip(runs, options.gains or [(0.0, 0.0)] * len(runs), strict=True)]
-    columns, data, weight = (np.concatenate(each) for each in zip(*parts, strict=True))
-    held = {k: structure.value(names[k]) for k in range(6) if not present[k] and names[k] in structure.names}
-    data = data - sum((columns[:, k] * value for k, value in held.items()), np.zeros(data.shape[0]))
-    answer, covariance, apart = _solved(columns[:, present], data, weight, source)
+    asked = _Asked(tuple(names), present, structure, relaxed)
+    gains = list(options.gains) or [(0.0, 0.0)] * len(runs)
+    answer, covariance, apart = _answered(runs, gains, asked, source)
+    for _ in range(_PASSES if asked.whole(answer)[3] > 0.0 else 0):
+        runs = [
+            harmonics_of(record, run.frequency, asked.held(answer, gain[0]))
+            for record, run, gain in zip(records, runs, gains, strict=True)
+        ]
+        answer, covariance, apart = _answered(runs, gains, asked, source, answer)
     return _result(structure, records, options, runs, (list(np.array(names)[present]), answer, covariance, apart))
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What is fitted.
+
+    Attributes:
+        names: of the parameters behind the columns; 6.
+        present: which of them are fitted, shape ``(6,)``.
+        structure: holds the values of the others.
+        relaxed: position of the relaxed spring [x].
+    """
+
+    names: tuple[str, ...]
+    present: Mask
+    structure: Model
+    relaxed: float
+
+    def whole(self, answer: Array) -> Array:
+        """Values of all columns, shape ``(6,)``, from those of the fitted ones; 0 where the structure holds no such term."""
+        has = self.structure.names
+        values = np.array([self.structure.value(name) if name in has else 0.0 for name in self.names])
+        values[self.present] = answer
+        return values
+
+    def held(self, answer: Array, gain: float) -> Held:
+        """What tells the friction of a resting body under a feedback of stiffness ``gain`` [F/x]."""
+        values = self.whole(answer)
+        return Held(float(values[2]) + gain, float(values[5] - values[2] * self.relaxed), float(values[3]))
+
+
+def _answered(
+    runs: Sequence[Harmonics], gains: Sequence[tuple[float, float]], asked: _Asked, source: str, before: Array | None = None
+) -> tuple[Array, Array, float]:
+    """Values of the fitted columns, their covariance and the misfit, as :func:`_solved`; ``before`` are those found before."""
+    known = np.zeros(6) if before is None else asked.whole(before)
+    parts = [_rows(run, gain, asked.relaxed, known) for run, gain in zip(runs, gains, strict=True)]
+    columns, data, weight = (np.concatenate(each) for each in zip(*parts, strict=True))
+    others = asked.whole(np.zeros(int(np.count_nonzero(asked.present))))
+    return _solved(columns[:, asked.present], data - columns @ others, weight, source)
 
 
 def _result(
