@@ -100,6 +100,11 @@ class Plant:
         """Mass of the body that the sensor sees, by itself [F s^2/x]."""
         return self.total_inertia(*values) if self.seen is None else self.seen(*values)
 
+    @property
+    def inertia_names(self) -> tuple[str, ...]:
+        """Names of the parameters that are a mass, or a moment of inertia, of the moving body: what a force may not show."""
+        return tuple(each.name for each in self.parameters if each.dimension == "F s^2/x" and each.positive)
+
     def start(self, values: Array, position: float, velocity: float) -> Array:
         """The states at the start of a run, ``(n_states,)``, with the sensor at ``position`` [x] and ``velocity`` [x/s]."""
         if self.initial is not None:

@@ -1,8 +1,7 @@
 """Reading an MCAP file record by record, up to the last one that is complete.
 
-A recorder that was killed leaves a file without footer and index, which readers refuse; the messages are there all the same.
-This walks over the records in the order they were written, takes what is whole and says what is not. Layout of the file: MCAP
-version 0 specification: magic, then records of one byte opcode, eight bytes length, content; chunks hold compressed records.
+Layout of the file: MCAP version 0 specification: magic, then records of one byte opcode, eight bytes length, content; chunks
+hold compressed records. How a file is passed over: :mod:`.scan`.
 """
 
 from __future__ import annotations
@@ -10,15 +9,15 @@ from __future__ import annotations
 import mmap
 import struct
 from binascii import crc32
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 
 from .blocks import UNPACK_ERRORS, unpacked
 from .errors import BagError
-from .topics import Raw, Topic, ros2_name
+from .scan import Channel, Scan
+from .topics import ros2_name
 
 __all__ = ["MAGIC", "McapScan", "mcap_metadata"]
 
@@ -28,13 +27,6 @@ _MSG, _IDL = MessageDefinitionFormat.MSG, MessageDefinitionFormat.IDL
 _FORMATS = {"ros2msg": _MSG, "ros1msg": _MSG, "ros2idl": _IDL, "omgidl": _IDL}
 _LATEST = 1 << 63  # [ns] since 1970; times are signed numbers everywhere else
 _UNDEFINED = MessageDefinition(MessageDefinitionFormat.NONE, "")
-
-
-class _Channel(NamedTuple):
-    topic: str
-    msgtype: str
-    definition: MessageDefinition
-    encoding: str
 
 
 def _string(content: bytes, at: int) -> tuple[str, int]:
@@ -65,13 +57,8 @@ def _records(content: bytes | mmap.mmap, at: int) -> Iterator[tuple[int, int, in
         at = stop
 
 
-class McapScan:
-    """Messages of an MCAP file without use of its index.
-
-    Attributes:
-        topics: what the complete records hold.
-        damage: what is incomplete or unreadable, in plain words; filled by the first pass over the file.
-    """
+class McapScan(Scan):
+    """Messages of an MCAP file."""
 
     def __init__(self, path: Path) -> None:
         """Pass once over the file.
@@ -79,47 +66,16 @@ class McapScan:
         Raises:
             BagError: empty, or not an MCAP file.
         """
-        self.path = path
-        self.damage: list[str] = []
-        self._channels: dict[int, _Channel] = {}
         self._schemas: dict[int, tuple[str, MessageDefinition]] = {}
-        self._odd = 0  # records that do not hold what they should
-        if path.stat().st_size == 0:
-            raise BagError(path, "is empty (0 bytes)", "record again")
-        with path.open("rb") as file:
-            self._content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        super().__init__(path)
+
+    def _first_record(self) -> int:
         if self._content[: len(MAGIC)] != MAGIC:
-            self.close()
-            raise BagError(path, "is not an MCAP file (its first bytes are not those of one)", "give a rosbag2 recording")
-        counts: dict[int, int] = {}
-        for channel, _, _ in self._messages(self.damage):
-            counts[channel] = counts.get(channel, 0) + 1
-        lost = sum(count for channel, count in counts.items() if channel not in self._channels)
-        if self._odd:
-            self.damage.append(f"{self._odd} records not readable and left out")
-        if lost:
-            self.damage.append(f"{lost} messages lost: the description of their topic is not readable")
-        merged: dict[tuple[str, str], Topic] = {}
-        for number, channel_entry in self._channels.items():
-            key = (channel_entry.topic, channel_entry.msgtype)
-            before = merged[key].n_messages if key in merged else 0
-            merged[key] = Topic(*key, before + counts.get(number, 0), channel_entry.definition, channel_entry.encoding)
-        self.topics = tuple(merged.values())
-
-    def close(self) -> None:
-        """Let go of the file."""
-        self._content.close()
-
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]:
-        """Messages in the order they were written; of all topics when ``topics`` is None."""
-        wanted = {number: entry for number, entry in self._channels.items() if topics is None or entry.topic in topics}
-        for number, log_time, data in self._messages([]):
-            entry = wanted.get(number)
-            if entry is not None:
-                yield Raw(entry.topic, entry.msgtype, log_time, data)
+            raise BagError(self.path, "is not an MCAP file (its first bytes are not those of one)", "give a rosbag2 recording")
+        return len(MAGIC)
 
     def _messages(self, damage: list[str]) -> Iterator[tuple[int, int, bytes]]:
-        for opcode, start, stop, complete in _records(self._content, len(MAGIC)):
+        for opcode, start, stop, complete in _records(self._content, self._start):
             if opcode in {_DATA_END, _FOOTER}:
                 return
             if opcode == 0 or (opcode > _DATA_END and opcode < 0x80):
@@ -175,7 +131,7 @@ class McapScan:
                 msgtype, definition = self._schemas.get(schema, ("unknown", _UNDEFINED))
                 if encoding == "ros1":
                     msgtype = ros2_name(msgtype)
-                self._channels[number] = _Channel(topic, msgtype, definition, "ros1" if encoding == "ros1" else "cdr")
+                self._channels[number] = Channel(topic, msgtype, definition, "ros1" if encoding == "ros1" else "cdr")
         except struct.error:
             self._odd += 1
 

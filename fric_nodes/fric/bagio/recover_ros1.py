@@ -1,7 +1,7 @@
 """Reading a ROS 1 bag record by record, up to the last one that is complete.
 
-As with MCAP, a recorder that was killed leaves a bag without index (``.bag.active``), so that the records are read in the order
-they were written and the index is not used at all. Layout of the file, bag format version 2.0: the line ``#ROSBAG V2.0``, then
+A recorder that was killed leaves a bag without index (``.bag.active``); how a file is passed over without one: :mod:`.scan`.
+Layout of the file, bag format version 2.0: the line ``#ROSBAG V2.0``, then
 records of header and data, each with its length before it (four bytes, little endian); a header is a list of fields
 ``name=value``, again with their lengths. Chunks hold further records, compressed by bz2 or lz4 or not at all.
 """
@@ -11,14 +11,14 @@ from __future__ import annotations
 import mmap
 import re
 import struct
-from collections.abc import Collection, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 
 from .blocks import UNPACK_ERRORS, unpacked
 from .errors import BagError
-from .topics import Raw, Topic, ros2_name
+from .scan import Channel, Scan
+from .topics import ros2_name
 
 __all__ = ["Ros1Scan"]
 
@@ -62,61 +62,10 @@ def _records(content: bytes | mmap.mmap, at: int) -> Iterator[tuple[bytes, int, 
         at = stop
 
 
-class Ros1Scan:
-    """Messages of a ROS 1 bag without use of its index.
+class Ros1Scan(Scan):
+    """Messages of a ROS 1 bag; one of another version, or an encrypted one, is refused."""
 
-    Attributes:
-        topics: what the complete records hold.
-        damage: what is incomplete or unreadable, in plain words; filled by the first pass over the file.
-    """
-
-    def __init__(self, path: Path) -> None:
-        """Pass once over the file.
-
-        Raises:
-            BagError: empty, not a ROS 1 bag, or one of another version, or encrypted.
-        """
-        self.path = path
-        self.damage: list[str] = []
-        self._connections: dict[int, tuple[str, str, MessageDefinition]] = {}
-        self._odd = 0  # records that do not hold what they should
-        if path.stat().st_size == 0:
-            raise BagError(path, "is empty (0 bytes)", "record again")
-        with path.open("rb") as file:
-            self._content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        try:
-            self._start = self._version()
-            counts: dict[int, int] = {}
-            for number, _, _ in self._messages(self.damage):
-                counts[number] = counts.get(number, 0) + 1
-        except BaseException:
-            self.close()
-            raise
-        lost = sum(count for number, count in counts.items() if number not in self._connections)
-        if self._odd:
-            self.damage.append(f"{self._odd} records not readable and left out")
-        if lost:
-            self.damage.append(f"{lost} messages lost: the description of their topic is not readable")
-        merged: dict[tuple[str, str], Topic] = {}
-        for number, (topic, msgtype, definition) in self._connections.items():
-            before = merged[topic, msgtype].n_messages if (topic, msgtype) in merged else 0
-            merged[topic, msgtype] = Topic(topic, msgtype, before + counts.get(number, 0), definition, "ros1")
-        self.topics = tuple(merged.values())
-
-    def close(self) -> None:
-        """Let go of the file."""
-        self._content.close()
-
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]:
-        """Messages in the order they were written; of all topics when ``topics`` is None."""
-        wanted = {number: entry for number, entry in self._connections.items() if topics is None or entry[0] in topics}
-        for number, log_time, data in self._messages([]):
-            entry = wanted.get(number)
-            if entry is not None:
-                yield Raw(entry[0], entry[1], log_time, data)
-
-    def _version(self) -> int:
-        """First byte after the line that says what the file is."""
+    def _first_record(self) -> int:
         found = re.match(rb"#ROSBAG V(\d+\.\d+)\n", self._content[:32])
         if found is None:
             raise BagError(self.path, "is not a ROS 1 bag (its first line is not that of one)", "give a recorded bag")
@@ -193,7 +142,7 @@ class Ros1Scan:
                 texts = [inner.get(name, b"").decode("utf-8", errors="replace") for name in (b"type", b"message_definition")]
                 topic = fields.get(b"topic", b"").decode("utf-8", errors="replace")
                 definition = MessageDefinition(MessageDefinitionFormat.MSG, texts[1])
-                self._connections[number] = ("/" + topic.strip("/"), ros2_name(texts[0]), definition)
+                self._channels[number] = Channel("/" + topic.strip("/"), ros2_name(texts[0]), definition, "ros1")
             elif operation not in _INDEX:
                 self._odd += 1
         except (struct.error, ValueError):

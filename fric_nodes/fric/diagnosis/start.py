@@ -89,7 +89,7 @@ def _by_inverse_dynamics(model: Model, train: Sequence[Record]) -> Model | None:
     # Of an inertia that hardly shows no more is taken than is sure.
     for name, variance in zip(fitted.free.names, np.diag(fitted.covariance), strict=True):
         value, reach = found.value(name), _SURE * float(np.sqrt(max(variance, 0.0)))
-        if name == "mass" and reach >= value:
+        if name in model.plant.inertia_names and reach >= value:
             found = found.with_value(name, max(_NEXT_TO_NOTHING * value, value - reach))
     return found if np.all(np.isfinite(found.values)) else None
 

@@ -35,11 +35,11 @@ __all__ = ["Equations", "equations", "nominal_conditions", "surroundings"]
 _FILTER_ORDER = 4
 _EDGE_PERIODS = 5.0  # of the cutoff frequency, dropped at either end of a stretch
 _WINDOW_BAND = 0.6  # of the row rate: band of white noise of as much power in the derivative
-_AT_TURNS = 0.1  # of the acceleration's energy: what is left when a tenth of the information about the inertia is
+_AT_TURNS = 0.1  # of the acceleration's energy, and of what is known of the inertia; statistical: errors 3 times as large
 _MARGIN = 0.25  # of the cutoff's period: how far the filter on the position carries a rest
 _HIGHEST = 0.36  # of the sampling rate: above it a filter and differences of samples no longer go together
 _MECHANICS = 100.0  # [Hz], the published choice for positioning axes
-_LEAST_BAND = 30.0  # [Hz]: a lower cutoff rounds off the reversals of an axis; noise is averaged away behind it instead
+_LEAST_BAND = 30.0  # [Hz]; physical: a servo turns an axis within some 10 ms, and a lower cutoff would round that off
 _QUIET = 2e-4  # noise of the velocity beside its own root mean square
 
 

@@ -175,7 +175,7 @@ def _follower(model: Model, stretch: Stretch) -> _Follower:
         step=np.full(n, h),
         effort=np.ascontiguousarray(intervals(stretch.effort, stretch.hold)),
         position=np.ascontiguousarray(stretch.raw_position[1:]),
-        start=initial_state(stretch.time, stretch.raw_position)[:2],
+        start=initial_state(stretch.time, stretch.raw_position, error=stretch.position_error)[:2],
         load=load,
         temperature=temperature,
         noise=noise_of(stretch.raw_position),

@@ -38,17 +38,16 @@ from .statistics import bartlett_lag
 
 __all__ = ["gap", "misfit", "refuse_undetermined", "validated"]
 
-_HALF = 50.0  # percent of the force, of its norm or of its variance
-_LITTLE = 0.1  # of the variance: what explains more is at least said not to describe the recording
-_CERTAIN = 0.999  # probability
-_EXPLAINS = 0.5  # of a sum of squares, left by a reason that is named
-_SHIFTS = 20  # rows to either side
-_BLOCKS = 20  # of a recording
-_ROWS = 5  # of a block, at least
-_LEVEL = 0.01  # probability of a difference by chance
-_INERTIA = "F s^2/x"
-_NOTHING = 1e-3  # of the force's norm, that an inertia takes
-_SEEN = 2.0  # standard errors
+_HALF = 50.0  # percent of the force, of its norm or of its variance; physical: what is left outweighs what is described
+_LITTLE = 0.1  # of the variance; physical: what explains more is at least said not to describe the recording
+_CERTAIN = 0.999  # probability; statistical
+_EXPLAINS = 0.5  # of a sum of squares, left by a reason that is named; physical: it explains as much as is left
+_SHIFTS = 20  # rows to either side; numerical: of the search for a shift
+_BLOCKS = 20  # of a recording; statistical: enough to tell a spread, and long beside the residual's correlation
+_ROWS = 5  # of a block, at least; statistical: of fewer rows the mean square says little
+_LEVEL = 0.01  # probability of a difference by chance; statistical
+_NOTHING = 1e-3  # of the force's norm, that an inertia takes; physical: less than any force is measured to
+_SEEN = 2.0  # standard errors; statistical
 
 
 def refuse_undetermined(
@@ -88,11 +87,10 @@ def refuse_undetermined(
 
 def _without_inertia(model: Model, free: FreeParameters, covariance: Array, found: Equations) -> str:
     """The name of an inertia that was fitted, takes next to none of the force and is not known to; empty when there is none."""
-    declared = [parameter.declaration for parameter in model.parameters()]
     acceleration = found.rows(lambda stretch: stretch.acceleration)
     share = float(np.sqrt(np.mean(acceleration**2) / max(float(np.mean(found.force**2)), 1e-300)))
     for k, (name, number) in enumerate(zip(free.names, free.index.tolist(), strict=True)):
-        if declared[number].dimension != _INERTIA or not declared[number].positive or "." in name:
+        if name not in model.plant.inertia_names:
             continue
         value, error = float(model.values[number]), math.sqrt(max(covariance[k, k], 0.0))
         # NaN: on its bound.

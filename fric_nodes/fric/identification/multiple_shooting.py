@@ -33,7 +33,6 @@ from scipy.sparse.linalg import splu
 from ..model import Model
 from ..record import Array, Index
 from ..signals.initial_state import initial_state
-from ..signals.instrument_noise import level_of
 from ..signals.resolution import noise_of
 from ..simulation import Predictor, Simulator, intervals, substeps
 from .equations import Equations
@@ -374,8 +373,7 @@ def shooting(model: Model, found: Equations, horizon: float | None, starts: str,
 
 def _starts(runs: Sequence[Run], cutoff: float) -> tuple[Array, Array]:
     """Position [x] and velocity [x/s] at the start of each run, and their standard errors, shape ``(n_runs, 2)`` each."""
-    errors = {stretch: level_of(stretch.raw_position) for stretch in dict.fromkeys(run.stretch for run in runs)}
-    found = [initial_state(run.stretch.time, run.stretch.raw_position, run.first, errors[run.stretch]) for run in runs]
+    found = [initial_state(run.stretch.time, run.stretch.raw_position, run.first, run.stretch.position_error) for run in runs]
     # What a difference of two runs can still be told from.
     least = np.array([_RESOLVED * float(np.ptp(run.stretch.raw_position)) for run in runs])[:, None]
     spread = np.maximum([state.standard_errors for state in found], least * np.array([1.0, 2.0 * np.pi * cutoff]))

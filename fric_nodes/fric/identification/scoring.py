@@ -86,7 +86,7 @@ def _along(model: Model, motion: Motion) -> Array:
 
 def free_run(model: Model, stretch: Stretch) -> Array:
     """Position of ``model`` [x], shape ``(n,)``, led by the measured force alone from the stretch's first state."""
-    begin = initial_state(stretch.time, stretch.raw_position)
+    begin = initial_state(stretch.time, stretch.raw_position, error=stretch.position_error)
     motion = simulate(
         model,
         stretch.effort,

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..record import Array
+from ..signals.instrument_noise import level_of
 from .differences import differentiated
 
 __all__ = ["FINER", "Motion", "Stretch"]
@@ -79,6 +80,11 @@ class Stretch:
         """The same with another position signal [x], shape ``(n,)``."""
         position, velocity, acceleration = differentiated(self.smooth(raw_position), self.sample_time)
         return replace(self, raw_position=raw_position, position=position, velocity=velocity, acceleration=acceleration)
+
+    @cached_property
+    def position_error(self) -> float:
+        """Standard deviation of the errors of the recorded position [x]."""
+        return level_of(self.raw_position)
 
     @cached_property
     def motion(self) -> Motion:

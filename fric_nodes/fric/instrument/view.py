@@ -14,8 +14,10 @@ import numpy as np
 from scipy import signal
 
 from ..record import Array, Index, Mask, Record
+from ..signals.instrument_noise import level_of
+from ..signals.resolution import step_of
 
-__all__ = ["Balance", "View", "friction_along", "imbalance", "resolution_of", "runs"]
+__all__ = ["Balance", "View", "friction_along", "imbalance", "runs"]
 
 _ORDER = 4
 _WIDEST = 100.0  # [Hz]
@@ -105,20 +107,17 @@ class View:
     @cached_property
     def resolution(self) -> float:
         """Step of the position sensor [x]; 0 when none shows."""
-        return resolution_of(self.record.position)
+        return step_of(self.record.position)
 
     @cached_property
     def effort_resolution(self) -> float:
         """Step of the effort [F]; 0 when none shows."""
-        return resolution_of(self.record.effort)
+        return step_of(self.record.effort)
 
     @cached_property
     def noise(self) -> float:
-        """Standard deviation of the position signal, steps included [x]."""
-        bend = np.abs(np.diff(self.even.position, 2))
-        random = 1.4826 * float(np.median(bend)) / np.sqrt(6.0) if bend.size else 0.0
-        rounding = 1e-14 * float(np.max(np.abs(self.even.position)))
-        return float(np.hypot(random, self.resolution / np.sqrt(12.0))) + rounding
+        """Standard deviation of the errors of the position, steps included [x]."""
+        return level_of(self.record.position)
 
     def low_pass(self, values: Array, cutoff: float | None = None) -> Array:
         """``values``, shape ``(n,)``, through the filter of the view, or to another ``cutoff`` [Hz]."""
@@ -304,19 +303,6 @@ def friction_along(view: View) -> tuple[float, float, float]:
     known = bool(np.all(np.isfinite(found.covariance)))
     error = float(np.sqrt(max(float(slope @ found.covariance @ slope), 0.0))) if known else float("inf")
     return mean, error, float(np.median(np.abs(v)))
-
-
-def resolution_of(values: Array) -> float:
-    """The step that ``values`` are whole multiples of apart; 0 when there is none."""
-    gaps = np.diff(np.unique(values))
-    # What is left of rounding is no step.
-    gaps = gaps[gaps > 1e-9 * max(float(np.ptp(values)), 1e-300)]
-    if gaps.size == 0:
-        return 0.0
-    least = float(np.min(gaps))
-    step = float(np.median(gaps[gaps < 1.2 * least]))
-    whole = gaps[gaps < 200.0 * step] / step
-    return step if float(np.mean(np.abs(whole - np.round(whole)) < 0.05)) > 0.95 else 0.0
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:

@@ -20,6 +20,7 @@ either side of a cut.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,15 +30,18 @@ from .resolution import step_of
 
 __all__ = ["Spike", "spikes_of", "without_spikes"]
 
-_LONGEST = 3  # samples
-_APART = 4.0  # times the largest that the rest of the recording does
-_AGREE = 0.25  # of a spike, by which what is before and behind may differ
-_OUTSIDE = 0.5  # of a spike, outside of the range of the other samples
-_BEYOND = 0.25  # of the range of the other samples, outside of it
-_MOST = 0.01  # of the samples: what is more frequent is no exception
-_ANSWER = (1, 2, 5, 15)  # samples on either side over which the velocity is taken
-_SURE = 5.0  # standard deviations of that, for one spike among many
-_TOGETHER = 3.0  # of the sum over all of them: 99.9 %
+_LONGEST = 3  # samples; physical: a fault of a conversion or a telegram, and no motion
+_APART = 4.0  # times the largest that the rest of the recording does; statistical: no extreme of the same distribution
+_AGREE = 0.25  # of a spike, by which what is before and behind may differ; physical: it comes back to where it left
+_OUTSIDE = 0.5  # of a spike, outside of the range of the other samples; physical: most of it is beyond what was measured
+_BEYOND = 0.25  # of the range of the other samples, outside of it; physical, likewise
+_MOST = 0.01  # of the samples; statistical: what is more frequent is no exception
+_ANSWER = (1, 2, 5, 15)  # samples on either side over which the velocity is taken; numerical: noise falls as motion blurs
+_SURE = 5.0  # standard deviations of that; statistical: one spike among 10^6 samples
+_TOGETHER = 3.0  # standard deviations of the sum over all of them; statistical: 99.9 %
+_NINETY = 1.645  # standard deviations that hold 90 % of a normal distribution; statistical
+_FLOAT = 1e-9  # of the top speed; numerical: what differences of floating point leave
+_ROUNDED = math.sqrt(0.5)  # of a step: four rounded values, less half of eight others, of a variance of 1/12 each
 _NAMED = 5  # spikes named one by one
 
 
@@ -203,8 +207,8 @@ def _answer(record: Record, spikes: list[Spike], w: int) -> Array:
     blow = np.zeros(n)
     blow[2 * w : n - 2 * w] = change[2 * w : n - 2 * w] - 0.5 * (change[4 * w :] + change[: n - 4 * w])
     # By the rarer ones: a machine that rests most of the time changes its velocity seldom, and then by much.
-    spread = float(np.quantile(np.abs(blow), 0.9)) / 1.645 + 1e-9 * float(np.max(np.abs(speed)))
-    spread = max(spread, 0.7 * step_of(position) / (w * record.sample_time))  # of differences of rounded values
+    spread = float(np.quantile(np.abs(blow), 0.9)) / _NINETY + _FLOAT * float(np.max(np.abs(speed)))
+    spread = max(spread, _ROUNDED * step_of(position) / (w * record.sample_time))
     # A force acts on the samples behind it, or on those before it, as it is held.
     means: list[float] = [np.sign(spike.height) * float(np.mean(blow[spike.first - 1 : spike.last + 1])) for spike in spikes]
     return np.asarray(np.array(means) / spread, dtype=np.float64)

@@ -84,12 +84,10 @@ class Jitter:
     Attributes:
         share: of the jitter that the motion follows: 0 if the position was read evenly, 1 if at its stamp; NaN: can't be told.
         error: standard error of it; infinite where it can't be told.
-        noise: standard deviation of the jitter that the chosen stamps still have [s].
     """
 
     share: float
     error: float
-    noise: float
 
     @property
     def follows(self) -> bool:
@@ -183,7 +181,7 @@ def rounded_grid(time: Array) -> tuple[Array, float] | None:
 
 def jitter_of(record: Record, grid: Grid) -> Jitter:
     """Whether the motion of ``record`` follows its stamps or the grid."""
-    nothing = Jitter(float("nan"), float("inf"), grid.spread)
+    nothing = Jitter(float("nan"), float("inf"))
     if record.n_samples < 10 * _DIFFERENCES or grid.period <= 0.0:
         return nothing
     together = _unbroken(grid, record.mask)
@@ -202,7 +200,7 @@ def jitter_of(record: Record, grid: Grid) -> Jitter:
     # Neighbours share samples: their products are added up over blocks.
     blocks = np.add.reduceat(score, np.arange(0, score.shape[0], 8 * _DIFFERENCES))
     error = float(np.sqrt(np.sum(blocks**2))) / power
-    return Jitter(share, error, 0.0)
+    return Jitter(share, error)
 
 
 def _unbroken(grid: Grid, valid: Mask) -> Mask:

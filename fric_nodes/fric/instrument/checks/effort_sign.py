@@ -14,8 +14,8 @@ from .position_sign import turned
 
 __all__ = ["CHECK"]
 
-_SURE = 4.0
-_ORDER = 10.0
+_SURE = 4.0  # standard errors; statistical
+_ORDER = 10.0  # times the rms of what is unexplained; physical: a misfit of the terms makes no force ten times its own size
 
 
 def _judge(view: View, evidence: Evidence) -> Finding:
