@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from fric.bench.benchmarks.calibration_forced import trial as forced
 from fric.bench.benchmarks.calibration_oscillation import CASES, free, parametric
 from fric.bench.benchmarks.calibration_static import TRIALS
 from fric.bench.benchmarks.calibration_two_stage import LIMITS, SPRINGS, recorded, structure, trial, truth
@@ -45,6 +46,14 @@ def test_of_static_maps(name: str) -> None:
     share, size = pooled(TRIALS[name], 8 if "three loads" in name else 12)
     assert share >= 0.72
     assert 0.4 < size < 1.6
+
+
+def test_of_forced_oscillations_that_stop_at_their_turns() -> None:
+    calibration, refused = count(forced, range(300, 312), 1)
+    assert refused <= 2  # those that rest for too long
+    score = calibration.estimates / calibration.errors
+    assert float(np.mean(calibration.coverage(0.9))) >= 0.75
+    assert 0.6 < float(np.sqrt(np.mean(score**2))) < 1.5
 
 
 def test_of_the_two_stage_method_in_fast_turns() -> None:

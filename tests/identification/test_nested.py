@@ -110,7 +110,7 @@ def _published(folder: Path, name: str) -> list[Record]:
 @pytest.mark.long
 @pytest.mark.real_data
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize("name", ["emps", "torso", "driveNo1"])
+@pytest.mark.parametrize("name", ["emps", "torso", "driveNo1", "driveNo2"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_published_recordings(data_folder: Path, name: str, seed: int) -> None:
     records = _published(data_folder, name)

@@ -265,6 +265,7 @@ KNOWN: dict[str, Case] = {
             "laws",
             "calibration",
             "calibration-oscillation",
+            "calibration-forced",
             "calibration-static",
             "calibration-two-stage",
             "calibration-tensor-product",
