@@ -265,10 +265,7 @@ KNOWN: dict[str, Case] = {
             "laws",
             "calibration",
             "calibration-oscillation",
-            "calibration-forced",
-            "calibration-static",
-            "calibration-two-stage",
-            "calibration-tensor-product",
+            *(f"calibration-{name}" for name in ("forced", "static", "two-stage", "tensor-product")),
             "online",
         )
     },

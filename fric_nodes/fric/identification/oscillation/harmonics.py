@@ -153,7 +153,6 @@ def harmonics_of(record: Record, frequency: float | None = None, held: Held | No
         means.append(np.mean(values, axis=0))
         still.append(float(np.mean(values[:, 3] < slow)))
     found, mean = np.array(lines), np.array(means)
-    # Against the phase of the force: against the clock a frequency that is a little off would look like a transient.
     first = _first_steady(found[:, 1] * np.exp(-1j * np.angle(found[:, 0])))
     if n_periods - first < _FEWEST:
         raise IdentificationError(
@@ -237,6 +236,7 @@ def _zero(values: Array, angle: float, latest: float) -> float:
 def _first_steady(position: np.ndarray) -> int:
     """Number of the first period from which the first harmonic stays what the second half has it.
 
+    Its phase is that against the force: against the clock, a frequency that is a little off would look like a transient.
     A transient that is still larger than the scatter of the later periods would bias their mean, so the first half is also
     held against that scatter; where the second half still has a transient, that is the scatter.
     """
