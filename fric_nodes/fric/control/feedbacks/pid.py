@@ -99,6 +99,11 @@ class Pid:
         proportional = gains.proportional * (gains.position_weight * reference[0] - state[0])
         self._integral = force - proportional - self._derivative if gains.integral > 0.0 else 0.0
 
+    @property
+    def finite(self) -> bool:
+        """False when integral or derivative isn't a finite number any more."""
+        return math.isfinite(self._integral) and math.isfinite(self._derivative)
+
     def set_gains(self, gains: PidGains) -> None:
         """Go on with other gains, without a jump of the output."""
         if self._before is not None:
