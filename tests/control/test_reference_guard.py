@@ -33,7 +33,7 @@ class Run:
             if speaks:
                 position, velocity, acceleration = motion(1e-9 * (self.now - 10**18))
                 self.guard.take(self.now, self.now, position + shift, velocity, acceleration)
-            self.points.append(self.guard.at(self.now))
+            self.points.append(self.guard.at(self.now)[:2])
 
     def assert_smooth(self) -> None:
         position, velocity = np.array(self.points).T
@@ -95,7 +95,7 @@ def test_what_no_reference_can_be_is_refused_by_name(change: tuple[float, float,
     position += motion(1e-9 * (run.now - 10**18))[0]
     assert run.guard.take(run.now, run.now + shift, position, velocity, acceleration) == why
     assert run.guard.counters[f"refused reference: {why}"] == 1
-    run.points.append(run.guard.at(run.now))
+    run.points.append(run.guard.at(run.now)[:2])
     run.go(0.1)
     assert run.points[-1] == pytest.approx(motion(1e-9 * (run.now - 10**18))[:2], abs=1e-2)
     assert before != run.points[-1]

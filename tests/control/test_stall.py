@@ -8,7 +8,7 @@ from collections import deque
 import numpy as np
 import pytest
 from fric.axis import SimulatedAxis
-from fric.control.pid import Pid, PidGains
+from fric.control.feedbacks.pid import Pid, PidGains
 from fric.control.reference_guard import ReferenceGuard, ReferenceLimits
 from fric.control.stall import StallGuard, StallLimits
 from fric.model_file import read_model
@@ -108,7 +108,7 @@ def test_a_controller_whose_state_is_not_finite_resets_and_says_so() -> None:
     loop.go(2.0)
     loop.pid._integral = math.inf
     loop.go(2.0)
-    assert loop.guard.counters["controller state not finite: reset"] == 1
+    assert loop.guard.counters["controller not finite: reset"] == 1
     assert np.abs(loop.errors[-250:]).max() < SETTLED
 
 

@@ -52,6 +52,9 @@ class Law(Protocol):
             measured: position [x].
             duration: time since the last sample [s].
             feedforward: force added inside the limit [F].
+
+        Raises:
+            InputError: an input or the output isn't finite.
         """
 
 

@@ -18,12 +18,12 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple
 
 from ..errors import InputError
+from .controller import Setpoint
 from .safety.stamps import StampGate
 
-__all__ = ["Following", "ReferenceGuard", "ReferenceLimits", "Setpoint"]
+__all__ = ["Following", "ReferenceGuard", "ReferenceLimits"]
 
 _NS = 1e-9
 _LONGEST = 0.02  # numerical: a sample of the setpoint counts as at most so long [s]; after a pause it starts anew anyway
@@ -39,13 +39,6 @@ class Following(str, Enum):
     APPROACHING = "approaching"
     STOPPING = "stopping"
     RESTING = "resting"
-
-
-class Setpoint(NamedTuple):
-    """What the controller is to follow: position [x] and velocity [x/s]."""
-
-    position: float
-    velocity: float
 
 
 @dataclass(frozen=True)
@@ -166,18 +159,19 @@ class ReferenceGuard:
             self._approach(self._ahead(now), passed)
         return self._setpoint
 
-    def _ahead(self, now: int) -> tuple[float, float]:
-        """Position and velocity of the reference at ``now``."""
+    def _ahead(self, now: int) -> Setpoint:
+        """The reference at ``now``."""
         stamp, position, velocity, acceleration = self._target
         ahead = (now - stamp) * _NS
         bent = min(max(ahead, -self._gap), self._gap)
         faster = velocity + bent * acceleration
         limits = self.limits
         place = position + bent * (velocity + 0.5 * bent * acceleration) + (ahead - bent) * faster
-        return min(max(place, limits.position_min), limits.position_max), faster
+        place = min(max(place, limits.position_min), limits.position_max)
+        return Setpoint(place, faster, acceleration if bent == ahead else 0.0)
 
     def _come_to_rest(self, passed: float) -> None:
-        position, velocity = self._setpoint
+        position, velocity, _ = self._setpoint
         if self.following in {Following.FOLLOWING, Following.APPROACHING}:
             self.counters["reference lost"] += 1
         slower = math.copysign(max(abs(velocity) - self.limits.acceleration * passed, 0.0), velocity)
@@ -187,14 +181,14 @@ class ReferenceGuard:
         self._offset = 0.0
         self.following = Following.STOPPING if slower != 0.0 else Following.RESTING
 
-    def _approach(self, target: tuple[float, float], passed: float) -> None:
-        position, velocity = self._setpoint
+    def _approach(self, target: Setpoint, passed: float) -> None:
+        position, velocity, _ = self._setpoint
         limits = self.limits
         if self.following is Following.FOLLOWING:
             self._offset *= math.exp(-passed / _FADE)
             here = target[0] + self._offset
             if abs(here - position) <= 2.0 * limits.speed * passed + 1e-9:
-                self._setpoint = Setpoint(here, target[1] - self._offset / _FADE)
+                self._setpoint = Setpoint(here, target[1] - self._offset / _FADE, target[2])
                 return
         self.following = Following.APPROACHING
         if passed <= 0.0:

@@ -18,39 +18,19 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
-from typing import Protocol
 
+from ..errors import InputError
+from .controller import Law, Setpoint
 from .reference_guard import ReferenceGuard
 from .safety.stamps import StampGate
 
-__all__ = ["Controller", "StallGuard", "StallLimits"]
+__all__ = ["StallGuard", "StallLimits"]
 
 _NS = 1e-9
 _LATE = 2.5  # numerical: a duration of more periods than this is a gap and no jitter
 _JITTER = 1.5  # numerical: so many periods more than usual are the jitter of a state that is the newest
 _SMOOTH = 0.05  # numerical: share of each new age in the usual one
 _STILL = 1e-3  # physical scale: below it, times the speed limit, an axis isn't worth a stop of its own
-
-
-class Controller(Protocol):
-    """What a controller has to do to be guarded."""
-
-    def step(self, reference: float, measured: float, duration: float, feedforward: float = 0.0) -> float:
-        """Output [F] for the reference [x] and the measured position [x], so long [s] after the last sample."""
-        ...
-
-    def begin(self, reference: tuple[float, float], state: tuple[float, float], force: float, duration: float) -> None:
-        """Start in motion with ``force`` [F]; reference and state: position [x] and velocity [x/s]."""
-        ...
-
-    def reset(self) -> None:
-        """Start anew."""
-        ...
-
-    @property
-    def finite(self) -> bool:
-        """False when the state of the controller holds something that isn't finite."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -82,7 +62,7 @@ class StallGuard:
         counters: states dropped, gaps, resets: how often each, by name.
     """
 
-    def __init__(self, controller: Controller, references: ReferenceGuard, limits: StallLimits) -> None:
+    def __init__(self, controller: Law, references: ReferenceGuard, limits: StallLimits) -> None:
         self.controller = controller
         self.references = references
         self.counters: Counter[str] = Counter()
@@ -132,19 +112,18 @@ class StallGuard:
             self._running, duration = True, period
         elif duration > _LATE * period:
             self.counters["gaps bridged"] += 1
-            setpoint = self.references.at(stamp)
-            self.controller.begin(setpoint, (position, velocity), self._force - feedforward, period)
+            self.controller.begin(self.references.at(stamp), (position, velocity), self._force - feedforward, period)
             duration = period
-        setpoint = self.references.at(stamp)
-        force = self.controller.step(setpoint.position, position, duration, feedforward)
-        if not (math.isfinite(force) and self.controller.finite):
-            self.counters["controller state not finite: reset"] += 1
+        try:
+            force = self.controller.answer(self.references.at(stamp), position, duration, feedforward)
+        except InputError:
+            force = math.nan
+        if not math.isfinite(force):
+            self.counters["controller not finite: reset"] += 1
             self.controller.reset()
             self.restart()
-            force = 0.0
-        else:
-            self._before = (stamp, position)
-        self._force = force
+            return None
+        self._before, self._force = (stamp, position), force
         return force
 
     def _left_over(self, now: int, stamp: int) -> str:
@@ -164,4 +143,4 @@ class StallGuard:
         if abs(velocity) < _STILL * self.references.limits.speed:
             velocity = 0.0
         self.references.start(stamp, position, velocity)
-        self.controller.begin((position, velocity), (position, velocity), force - feedforward, self._limits.period)
+        self.controller.begin(Setpoint(position, velocity), (position, velocity), force - feedforward, self._limits.period)

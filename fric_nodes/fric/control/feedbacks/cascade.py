@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ...errors import InputError
 from ...parameter import Parameter
 from ..controller import Controller, Setpoint
 
@@ -83,6 +84,9 @@ class Cascade:
             measured: position [x].
             duration: time since the last sample [s].
             feedforward: force added inside the limit [F].
+
+        Raises:
+            InputError: the output isn't finite; the controller has to be reset.
         """
         gains = self.gains
         before = measured if self._before is None else self._before
@@ -91,6 +95,8 @@ class Cascade:
         error = gains.position_gain * (reference - measured) + gains.velocity_weight * velocity - self._velocity
         integral = self._integral + gains.velocity_integral * duration * error
         wanted = gains.velocity_gain * error + integral + feedforward
+        if not math.isfinite(wanted):
+            raise InputError("cascade", f"its output is {wanted}", "reset the controller")
         output = min(max(wanted, -self.limit), self.limit)
         if output != wanted:
             self.saturated += 1

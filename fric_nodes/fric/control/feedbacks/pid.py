@@ -99,11 +99,6 @@ class Pid:
         proportional = gains.proportional * (gains.position_weight * reference[0] - state[0])
         self._integral = force - proportional - self._derivative if gains.integral > 0.0 else 0.0
 
-    @property
-    def finite(self) -> bool:
-        """False when integral or derivative isn't a finite number any more."""
-        return math.isfinite(self._integral) and math.isfinite(self._derivative)
-
     def set_gains(self, gains: PidGains) -> None:
         """Go on with other gains, without a jump of the output."""
         if self._before is not None:
@@ -128,7 +123,8 @@ class Pid:
             feedforward: force added inside the limit [F].
 
         Raises:
-            PidError: an input isn't finite, or the duration isn't positive; the state is left as it was.
+            PidError: an input isn't finite, or the duration isn't positive; the state is left as it was. Or the output isn't
+                finite, by numbers that are too large; the controller has to be reset.
         """
         if not (math.isfinite(reference) and math.isfinite(measured) and math.isfinite(feedforward)):
             given = f"reference {reference}, measured {measured}, feedforward {feedforward}"
@@ -144,6 +140,8 @@ class Pid:
         self._derivative = filtered / (gains.filter_time + duration)
         self._integral += gains.integral * duration * error
         wanted = gains.proportional * (b * reference - measured) + self._integral + self._derivative + feedforward
+        if not math.isfinite(wanted):
+            raise PidError("PID", f"its output is {wanted}", "reset the controller")
         output = min(max(wanted, -self.limit), self.limit)
         if output != wanted:
             self.saturated += 1
