@@ -137,6 +137,11 @@ class SerialEmulator:
         self._port.symlink_to(os.ttyname(self._slave))
         self._splitter = Splitter()
 
+    @property
+    def plugged(self) -> bool:
+        """True while the device is there."""
+        return self._master >= 0
+
     def unplug(self) -> None:
         """Make the device disappear."""
         for handle in (self._master, self._slave):
