@@ -1,0 +1,87 @@
+"""A drive with the safety layer in front of it, opened again when its connection was lost."""
+
+from __future__ import annotations
+
+from ..control.safety import SafetyError, SafetyLayer, State
+from .drive import Drive, DriveError, JointReading
+
+__all__ = ["SupervisedDrive"]
+
+_RETRY = 200_000_000  # physical scale: [ns] between two tries to open; a device is back within a second then
+
+
+class SupervisedDrive:
+    """What a bridge does in each period. No force reaches the drive but by the layer.
+
+    A lost drive is a latched fault of the layer. The drive is opened again by itself, and gives no force until the fault is
+    reset and the layer enabled, by whoever is responsible.
+
+    Args:
+        drive: not opened yet.
+        layer: safety layer of the axis.
+        autostart: enable once, as soon as there are readings to rely on.
+
+    Attributes:
+        trouble: why the drive isn't open; empty when it is.
+    """
+
+    def __init__(self, drive: Drive, layer: SafetyLayer, autostart: bool = False) -> None:
+        self.layer = layer
+        self._drive = drive
+        self._starts = autostart
+        self._is_open = False
+        self._next_try: int | None = None
+        self.trouble = "not opened yet"
+
+    def tick(self, now: int) -> JointReading | None:
+        """Send the force of this period, at ``now`` [ns], and give the newest reading, if there is one."""
+        force = self.layer.step(now)
+        if not (self._is_open or self._opens(now)):
+            return None
+        try:
+            reading = self._drive.exchange(force)
+        except DriveError as error:
+            self._lose(now, error)
+            return None
+        if reading is not None:
+            self.layer.reading(now, reading.stamp, reading.position, reading.temperature)
+            if self._starts:
+                self._start(now)
+        return reading
+
+    def _opens(self, now: int) -> bool:
+        if self._next_try is not None and 0 <= self._next_try - now <= _RETRY:
+            return False
+        try:
+            self._drive.open()
+        except DriveError as error:
+            self.trouble = str(error)
+            self._next_try = now + _RETRY
+            return False
+        self._is_open, self.trouble = True, ""
+        self.layer.counters["drive opened"] += 1
+        return True
+
+    def _lose(self, now: int, error: DriveError) -> None:
+        self.layer.fail("drive", error.problem, now)
+        self.trouble = str(error)
+        self._is_open = False
+        self._next_try = now + _RETRY
+        self._drive.close()
+
+    def _start(self, now: int) -> None:
+        """Enable as soon as the layer has readings to rely on, once."""
+        if self.layer.state is not State.DISABLED:
+            self._starts = False
+            return
+        try:
+            self.layer.enable(now)
+        except SafetyError:
+            return
+        self._starts = False
+
+    def close(self) -> None:
+        """Let go of the drive, which takes the force away."""
+        self._is_open = False
+        self.trouble = "closed"
+        self._drive.close()
