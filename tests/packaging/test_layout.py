@@ -17,7 +17,9 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PREFIX = Path(sys.prefix)
 # written out here, not read from the list that the build reads
-NODES = {"plant", "excitation", "identifier", "compensator", "pid", "recorder", "player", "experiment", "monitor"}
+NODES = {"plant", "excitation", "identifier", "compensator", "pid", "recorder", "player", "experiment", "monitor"} | {
+    "hardware_bridge"
+}
 
 
 def version_in(package_xml: Path) -> str | None:

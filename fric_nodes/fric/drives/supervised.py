@@ -13,8 +13,8 @@ _RETRY = 200_000_000  # physical scale: [ns] between two tries to open; a device
 class SupervisedDrive:
     """What a bridge does in each period. No force reaches the drive but by the layer.
 
-    A lost drive is a latched fault of the layer. The drive is opened again by itself, and gives no force until the fault is
-    reset and the layer enabled, by whoever is responsible.
+    A drive that is lost while it may move is a latched fault of the layer. It is opened again by itself, and gives no force
+    until the fault is reset and the layer enabled, by whoever is responsible.
 
     Args:
         drive: not opened yet.
@@ -63,7 +63,8 @@ class SupervisedDrive:
         return True
 
     def _lose(self, now: int, error: DriveError) -> None:
-        self.layer.fail("drive", error.problem, now)
+        if self.layer.state in {State.ENABLED, State.STOPPING}:
+            self.layer.fail("drive", error.problem, now)
         self.trouble = str(error)
         self._is_open = False
         self._next_try = now + _RETRY

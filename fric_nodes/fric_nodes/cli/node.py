@@ -11,7 +11,18 @@ from fric.errors import InputError
 
 __all__ = ["NODES", "register"]
 
-NODES = ("plant", "excitation", "identifier", "compensator", "pid", "recorder", "player", "experiment", "monitor")
+NODES = (
+    "plant",
+    "excitation",
+    "identifier",
+    "compensator",
+    "pid",
+    "recorder",
+    "player",
+    "experiment",
+    "monitor",
+    "hardware_bridge",
+)
 
 
 def register(app: typer.Typer) -> None:
