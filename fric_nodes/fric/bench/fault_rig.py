@@ -93,7 +93,9 @@ class Outcome:
 
 class _Drive(Protocol):
     axis: SimulatedAxis
-    force: float
+
+    @property
+    def force(self) -> float: ...
 
     def exchange(self, force: float, now: int) -> Joint | None: ...
 

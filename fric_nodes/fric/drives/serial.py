@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable
+from typing import Any
 
 from .drive import Drive, DriveError, DriveKind, DriveOption, JointReading, Link, Options
 from .serial_frames import FAULT, WATCHDOG, Command, Splitter, Status, newer, pack
@@ -41,7 +42,7 @@ class SerialDrive:
         self._port, self._baud = port, baud
         self._timeout = round(_NS * timeout)
         self._now = now
-        self._line: object | None = None
+        self._line: Any = None
         self.damaged = self.overtaken = 0
         self._sequence = 0
 
@@ -100,7 +101,6 @@ class SerialDrive:
         import serial
 
         line = self._line
-        assert isinstance(line, serial.Serial)
         try:
             data = line.read(_AT_ONCE)
             # A line that is full means that the drive doesn't listen: its silence will tell.
@@ -141,9 +141,6 @@ class SerialDrive:
         line, self._line = self._line, None
         if line is None:
             return
-        import serial
-
-        assert isinstance(line, serial.Serial)
         self._sequence = (self._sequence + 1) & 0xFFFFFFFF
         with contextlib.suppress(OSError, TypeError):  # where the line is gone, the drive's watchdog takes the force away
             line.write(pack(Command(self._sequence, 0.0)))

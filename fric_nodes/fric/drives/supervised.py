@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..control.safety import SafetyError, SafetyLayer, State
 from .drive import Drive, DriveError, JointReading
 
@@ -33,9 +35,14 @@ class SupervisedDrive:
         self._next_try: int | None = None
         self.trouble = "not opened yet"
 
-    def tick(self, now: int) -> JointReading | None:
-        """Send the force of this period, at ``now`` [ns], and give the newest reading, if there is one."""
-        force = self.layer.step(now)
+    def tick(self, now: int, reference: float = math.nan) -> JointReading | None:
+        """Send the force of this period, at ``now`` [ns], and give the newest reading, if there is one.
+
+        Args:
+            now: present time [ns].
+            reference: position wanted now [x], for the following error; NaN: none.
+        """
+        force = self.layer.step(now, reference)
         if not (self._is_open or self._opens(now)):
             return None
         try:

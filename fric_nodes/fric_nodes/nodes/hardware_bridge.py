@@ -13,24 +13,24 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from fric.control.safety import SafetyError, SafetyLayer
+from fric.control.safety import SafetyLayer
 from fric.drives import DRIVES
 from fric.drives.drive import checked_options
 from fric.drives.supervised import SupervisedDrive
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
-from std_srvs.srv import Trigger
 
-from fric_interfaces.msg import StampedForce
+from fric_interfaces.msg import Reference, StampedForce
 
 from .base import PERIOD, LoopNode, wall_clock
-from .convert import MessageError, set_stamp
+from .convert import MessageError, from_seconds, set_stamp
 from .drive_topics import DriveTopics
 from .forces import STAMPED, force_in, force_type
 from .main import run
 from .parameters import NodeParameter
 from .qos import SAMPLES
 from .safety_parameters import SAFETY, limits_of
+from .triggers import add_triggers
 
 __all__ = ["HardwareBridgeNode", "main"]
 
@@ -71,8 +71,11 @@ class HardwareBridgeNode(LoopNode):
         self._state.header.frame_id = self.joint
         self._publisher = self.create_publisher(JointState, "joint_states", SAMPLES)
         self._commands = self.create_subscription(force_type(self), "force_command", self._on_command, SAMPLES)
-        for name, act in (("enable", self._layer.enable), ("disable", self._layer.disable), ("reset_fault", self._layer.reset)):
-            self.create_service(Trigger, f"~/{name}", self._service(act))
+        self._wanted = (0, math.nan)
+        if math.isfinite(self._layer.limits.following_error):
+            self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
+        requests = {"enable": self._layer.enable, "disable": self._layer.disable, "reset_fault": self._layer.reset}
+        add_triggers(self, {name: self._at_once(act) for name, act in requests.items()})
         self.create_timer(self.period, self._tick)
         self.get_logger().info(f"{kind.title}; joint {self.joint}, {self.period:g} s; limits: {self._layer.limits}")
 
@@ -80,7 +83,7 @@ class HardwareBridgeNode(LoopNode):
         """The time of stamps [ns]: that of day at the start, and counted on without its corrections."""
         return self._epoch + time.monotonic_ns() - self._origin
 
-    def condition(self) -> Mapping[str, object]:
+    def condition(self) -> Mapping[str, str]:
         """What the node adds to its report."""
         state = self._layer.condition()
         return {"driver": self.settings.text("driver"), "drive": self._drive.trouble or "open", **state}
@@ -89,21 +92,21 @@ class HardwareBridgeNode(LoopNode):
         """Level and text of the report: faults first, then what hinders or was refused."""
         layer = self._layer
         said = [f"{name} ({detail})" for name, detail in layer.faults.items()]
-        if self._drive.trouble:
-            said.append(f"drive: {self._drive.trouble}")
+        said += [f"drive: {self._drive.trouble}"] if self._drive.trouble else []
         level = DiagnosticStatus.ERROR if said else DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK
         return level, "; ".join([layer.state.value, *said, *troubles])
 
-    def _service(self, act: Callable[[int], None]) -> Callable[[Any, Any], Any]:
-        def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            try:
-                act(self._now())
-                response.success, response.message = True, self._layer.state.value
-            except SafetyError as error:
-                response.success, response.message = False, str(error)
-            return response
+    def _at_once(self, act: Callable[[int], None]) -> Callable[[], str]:
+        """``act`` at the present time; then the state of the layer."""
 
-        return answer
+        def acted() -> str:
+            act(self._now())
+            return self._layer.state.value
+
+        return acted
+
+    def _on_reference(self, message: Reference) -> None:
+        self._wanted = (self._now(), message.position)
 
     def _on_command(self, message: StampedForce | Float64) -> None:
         now, layer = self._now(), self._layer
@@ -116,7 +119,9 @@ class HardwareBridgeNode(LoopNode):
 
     def _tick(self) -> None:
         now = self._now()
-        reading = self._drive.tick(now)
+        since, wanted = self._wanted
+        fresh = now - since <= from_seconds(self._layer.limits.command_timeout)
+        reading = self._drive.tick(now, wanted if fresh else math.nan)
         for event in self._layer.events():
             if event.text.startswith("fault"):
                 self.get_logger().error(event.text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from fric.control.safety import Limits
 
@@ -17,6 +18,7 @@ SAFETY = (
     NodeParameter("speed_limit", _NONE, "largest speed; 1e12: none", "m/s or rad/s", 1e-9, _NONE),
     NodeParameter("position_min", -_NONE, "lower end of the range; -1e12: none", "m or rad", -_NONE, _NONE),
     NodeParameter("position_max", _NONE, "upper end of the range; 1e12: none", "m or rad", -_NONE, _NONE),
+    NodeParameter("following_error", _NONE, "largest distance of position and reference; 1e12: none", "m or rad", 1e-12, _NONE),
     NodeParameter("temperature_limit", _NONE, "largest temperature of the drive, where it is measured", "degC", 0.0, _NONE),
     NodeParameter(
         "inertia_min", 0.0, "least inertia; 0: unknown, a stop takes the force away without braking", "kg or kg m^2", 0.0, _NONE
@@ -43,7 +45,7 @@ def limits_of(settings: Settings, period: float) -> Limits:
     Raises:
         SafetyError: they make no sense together.
     """
-    values = {}
+    values: dict[str, Any] = {}
     for parameter in SAFETY:
         if isinstance(parameter.default, bool):
             continue

@@ -89,6 +89,21 @@ def test_the_force_is_finite_limited_and_no_faster_than_its_rate(
         before = force
 
 
+def test_a_fault_while_it_waits_to_resume_ends_the_waiting() -> None:
+    layer, now = started(replace(LIMITS, resume=True), True)
+    now += 10**8
+    layer.step(now)  # both inputs are lost
+    assert layer.state is not State.ENABLED
+    layer.fail("drive", "of the test", now)
+    for _ in range(100):
+        now += H
+        layer.reading(now, now, 0.0)
+        layer.command(now, now, 10.0, "a")
+        layer.step(now)
+    assert layer.state is State.FAULT
+    assert layer.force == 0.0
+
+
 @settings(max_examples=200, deadline=None)
 @given(st.lists(calls, max_size=40))
 def test_nothing_stays_poisoned(sequence: list[tuple[str, float, int, object]]) -> None:

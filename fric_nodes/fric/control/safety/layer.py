@@ -218,6 +218,7 @@ class SafetyLayer:
         if cause in self.faults:
             return
         self.faults[cause] = detail
+        self._resuming = False
         self.counters[f"fault: {cause}"] += 1
         self._say(now, f"fault: {cause} ({detail})")
         if self.state is State.ENABLED:
