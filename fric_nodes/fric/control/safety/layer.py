@@ -355,7 +355,7 @@ class SafetyLayer:
             self.fail("stop not reached", f"still at {speed:.6g} when the axis should rest", now)
         if abs(speed) <= limits.at_rest and abs(self.force) <= brake_force(limits, limits.at_rest) + limits.load:
             self._end_stop(now, "at rest")
-            return self.force
+            return self.force if limits.hold and self.faults else 0.0
         return -math.copysign(brake_force(limits, abs(speed)), speed)
 
     def _end_stop(self, now: int, why: str) -> None:
