@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -22,15 +23,15 @@ from std_msgs.msg import Float64
 
 from fric_interfaces.msg import Reference, StampedForce
 
-from .base import PERIOD, LoopNode, wall_clock
-from .convert import MessageError, from_seconds, set_stamp
-from .drive_topics import DriveTopics
-from .forces import STAMPED, force_in, force_type
-from .main import run
-from .parameters import NodeParameter
-from .qos import SAMPLES
-from .safety_parameters import SAFETY, limits_of
-from .triggers import add_triggers
+from ..convert import MessageError, from_seconds, set_stamp
+from ..drive_topics import DriveTopics
+from ..forces import STAMPED, force_in, force_type
+from ..loop import PERIOD, LoopNode, wall_clock
+from ..parameters import NodeParameter
+from ..qos import SAMPLES
+from ..run import run
+from ..safety_parameters import SAFETY, limits_of
+from ..triggers import add_triggers
 
 __all__ = ["HardwareBridgeNode", "main"]
 
@@ -76,14 +77,14 @@ class HardwareBridgeNode(LoopNode):
             self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
         requests = {"enable": self._layer.enable, "disable": self._layer.disable, "reset_fault": self._layer.reset}
         add_triggers(self, {name: self._at_once(act) for name, act in requests.items()})
-        self.create_timer(self.period, self._tick)
+        self.create_timer(self.period, self._tick, clock=self.steady)
         self.get_logger().info(f"{kind.title}; joint {self.joint}, {self.period:g} s; limits: {self._layer.limits}")
 
     def _now(self) -> int:
         """The time of stamps [ns]: that of day at the start, and counted on without its corrections."""
         return self._epoch + time.monotonic_ns() - self._origin
 
-    def condition(self) -> Mapping[str, str]:
+    def condition(self) -> Mapping[str, object]:
         """What the node adds to its report."""
         state = self._layer.condition()
         return {"driver": self.settings.text("driver"), "drive": self._drive.trouble or "open", **state}
@@ -141,10 +142,8 @@ class HardwareBridgeNode(LoopNode):
         self._drive.close()
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run(HardwareBridgeNode, args)
-
+main = partial(run, HardwareBridgeNode)
+"""Serve the node until a signal comes."""
 
 if __name__ == "__main__":
     main()
