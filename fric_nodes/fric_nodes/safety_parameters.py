@@ -24,7 +24,8 @@ SAFETY = (
         "inertia_min", 0.0, "least inertia; 0: unknown, a stop takes the force away without braking", "kg or kg m^2", 0.0, _NONE
     ),
     NodeParameter("inertia_max", _NONE, "largest inertia", "kg or kg m^2", 0.0, _NONE),
-    NodeParameter("friction", 0.0, "largest resistance to motion at any allowed speed", "N or N m", 0.0, _NONE),
+    NodeParameter("friction", 0.0, "largest resistance besides the viscous one, break-away included", "N or N m", 0.0, _NONE),
+    NodeParameter("viscous", 0.0, "largest growth of the resistance with speed", "N s/m or N m s/rad", 0.0, _NONE),
     NodeParameter("load", 0.0, "largest force that moves the axis besides the drive's", "N or N m", 0.0, _NONE),
     NodeParameter("position_noise", 0.0, "largest error of a position reading, half a step included", "m or rad", 0.0, _NONE),
     NodeParameter("latency", 0.004, "from a force's output until it acts, and from a reading until its use", "s", 0.0, 1.0),

@@ -178,14 +178,17 @@ def test_controller_refuses_bad_states_and_stops_with_them(graph: Graph) -> None
         states.publish(message)
         time.sleep(0.005)
 
-    send()
-    graph.until(lambda: len(listener.commands) == 1, "an answer")
+    # The first state has no velocity yet, and isn't answered.
+    graph.until(lambda: send() or len(listener.commands) > 0, "an answer")
+    answers = len(listener.commands)
     send(position=[math.nan])
     send(name=["other"])
     send(position=[])
     graph.until(lambda: pid.counters["refused joint state"] == 3, "three refusals")
+    graph.until(lambda: send() or len(listener.commands) > answers, "an answer again")
+    answers = len(listener.commands)
     send(name=["other", "axis"], position=[5.0, -0.001])
-    graph.until(lambda: len(listener.commands) == 2, "an answer to the good part of two joints")
-    assert listener.commands[1] > 0.0
+    graph.until(lambda: len(listener.commands) > answers, "an answer to the good part of two joints")
+    assert listener.commands[-1] > 0.0
     time.sleep(0.2)
-    assert len(listener.commands) == 2
+    assert len(listener.commands) == answers + 1

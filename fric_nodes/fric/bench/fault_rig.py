@@ -34,9 +34,9 @@ _DT = 1e-9 * H
 _SIZE, _PACE = 0.03, 2.0 * math.pi * 0.8  # [m] and [rad/s] of the motion
 LIMITS = Limits(
     100.0, 5000.0, speed=0.5, position_min=-0.1, position_max=0.1,
-    inertia_min=1.6, inertia_max=2.4, friction=32.0, load=1.0, position_noise=3e-7,
+    inertia_min=1.6, inertia_max=2.4, friction=16.0, viscous=45.0, load=1.0, position_noise=3e-7,
 )  # fmt: skip
-"""Of the demo axis: 2 kg and at most 32 N of friction at 0.5 m/s; its parameters known to a fifth."""
+"""Of the demo axis: 2 kg, 14 N to break away, 37 N s/m; its parameters known to a fifth."""
 
 
 class Reference(NamedTuple):

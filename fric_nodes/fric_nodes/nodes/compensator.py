@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from functools import partial
@@ -22,6 +23,7 @@ from ..model_intake import ModelIntake
 from ..parameters import NodeParameter
 from ..qos import SAMPLES
 from ..run import run
+from ..wall_time import REFERENCES, StampClock, reference_guard
 
 __all__ = ["CompensatorNode", "main"]
 
@@ -37,6 +39,7 @@ PARAMETERS = (
                   settable=True),
     NodeParameter("transition_time", 0.2, "time to change from a model to another, and to switch on and off", "s", 0.0, 100.0),
     NodeParameter("rest_fade_time", 0.1, "time in which a static friction force is let down at rest", "s", 0.0, 100.0),
+    *REFERENCES,
     STAMPED,
 )  # fmt: skip
 
@@ -65,6 +68,8 @@ class CompensatorNode(LoopNode):
         self._intake = ModelIntake(self, self._checked, self._feedforward.set_model)
         settings.when_changed(self._on_settings)
         self._forces = ForcePublisher(self, "feedforward_force")
+        self._clock, self._watch = StampClock(self), reference_guard(settings)
+        self._watch.counters = self.counters
         self._answers: Answers[ReferencePoint, float] = Answers()
         self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
 
@@ -101,8 +106,17 @@ class CompensatorNode(LoopNode):
         if self.lock_step:
             self._on_step(reference)
             return
+        why = self._watch.take(self._clock(), *reference)
+        if why:
+            self.get_logger().warning(f"refused reference: {why}", throttle_duration_sec=1.0)
+            return
         stamp, *motion = reference
-        self._forces.publish(stamp, self._feedforward.step(stamp * 1e-9, *motion))
+        force = self._feedforward.step(stamp * 1e-9, *motion)
+        if not math.isfinite(force):
+            self.counters["feedforward not finite: reset"] += 1
+            self._feedforward.reset()
+            return
+        self._forces.publish(stamp, force)
         self.deadlines.tick(time.monotonic())
         self.deadlines.latency((time.time_ns() - stamp) * 1e-9)
 

@@ -1,7 +1,9 @@
 """Position control: takes ``reference``, ``joint_states`` and ``feedforward_force``, gives ``force_command``.
 
-In wall time every joint state is answered at once, with the latest reference extrapolated to its stamp. In lock-step the answer
-to a joint state waits for the reference, and the feedforward, of the same stamp.
+In wall time every joint state is answered at once, with the latest reference led on to its stamp. What is late, not finite or
+no motion of the axis is refused; a reference that is lost ends in a controlled stop, a pause of the process without a jump
+(:mod:`fric.control.stall`). In lock-step the answer to a joint state waits for the reference, and the feedforward, of the same
+stamp.
 """
 
 from __future__ import annotations
@@ -13,13 +15,12 @@ from functools import partial
 from typing import Any
 
 from fric.control.feedbacks.pid import Pid
-from fric.control.reference import ReferencePoint
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from fric_interfaces.msg import Reference, StampedForce
 
-from ..convert import JointSample, from_seconds
+from ..convert import JointSample
 from ..forces import STAMPED, ForcePublisher, force_in, force_type, reference_in
 from ..lockstep import Matching
 from ..loop import LOCK_STEP, PERIOD, LoopNode
@@ -27,6 +28,7 @@ from ..parameters import NodeParameter
 from ..pid_parameters import GAINS, gains_of
 from ..qos import SAMPLES
 from ..run import run
+from ..wall_time import REFERENCES, STATES, WallControl
 
 __all__ = ["PidNode", "main"]
 
@@ -37,7 +39,8 @@ PARAMETERS = (
     *GAINS,
     NodeParameter("use_feedforward", True, "add the feedforward force; in lock-step false means not to wait for one"),
     NodeParameter("feedforward_timeout", 0.1, "wall time: leave out a feedforward that is older", "s", 1e-3, 1e6),
-    NodeParameter("reference_timeout", 0.1, "wall time: hold the last position when references stop so long", "s", 1e-3, 1e6),
+    *REFERENCES,
+    *STATES,
     STAMPED,
 )
 
@@ -57,7 +60,7 @@ class PidNode(LoopNode):
         self._adds = settings.flag("use_feedforward")
         self._answered = -1
         self._matching: Matching[JointSample] = Matching(2 if self._adds else 1)
-        self._reference: ReferencePoint | None = None
+        self._wall = WallControl(self, self._pid)
         self._feedforward = (-math.inf, 0.0)
         self._commands = ForcePublisher(self, "force_command")
         self.create_subscription(JointState, "joint_states", self._on_state, SAMPLES)
@@ -71,16 +74,17 @@ class PidNode(LoopNode):
 
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report."""
-        return {"saturated": str(self._pid.saturated)}
+        return {"saturated": str(self._pid.saturated), "reference": self._wall.following}
 
     def _on_reference(self, message: Reference) -> None:
         reference = self.usable("reference", reference_in, message)
         if reference is None:
             return
-        self._reference = reference
-        if self.lock_step:
-            self._matching.put(_REFERENCE, reference.stamp, reference.position)
-            self._answer()
+        if not self.lock_step:
+            self._wall.reference(reference)
+            return
+        self._matching.put(_REFERENCE, reference.stamp, reference.position)
+        self._answer()
 
     def _on_feedforward(self, message: StampedForce | Float64) -> None:
         given = self.usable("feedforward", force_in, message)
@@ -122,22 +126,13 @@ class PidNode(LoopNode):
     # Wall time
 
     def _follow(self, state: JointSample) -> None:
-        if state.stamp <= self._answered and self._answered - state.stamp < from_seconds(1.0):
-            self.refuse_late_state()
-            return
-        duration = self.period if self._answered < 0 else (state.stamp - self._answered) * 1e-9
-        if not 0.0 < duration < 50.0 * self.period:
-            # A pause, or another clock: what the controller remembers is not of this motion.
-            self._pid.reset()
-            duration = self.period
-        if self._reference is None:
-            self._reference = ReferencePoint(state.stamp, state.position, 0.0, 0.0)
-        wanted = self._reference.at(state.stamp, self.settings.number("reference_timeout"))
         given, force = self._feedforward
         now = time.monotonic()
         fresh = now - given <= self.settings.number("feedforward_timeout")
-        self._commands.publish(state.stamp, self._pid.step(wanted, state.position, duration, force if fresh else 0.0))
-        self._answered = state.stamp
+        answer = self._wall.answer(state, force if fresh else 0.0)
+        if answer is None:
+            return
+        self._commands.publish(state.stamp, answer)
         self.deadlines.tick(now)
         self.deadlines.latency((time.time_ns() - state.stamp) * 1e-9)
 

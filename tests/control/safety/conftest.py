@@ -14,7 +14,7 @@ H = 2_000_000  # [ns] period
 DT = 1e-9 * H  # [s]
 LIMITS = Limits(
     100.0, 3000.0, speed=0.5, position_min=-0.1, position_max=0.1,
-    inertia_min=1.6, inertia_max=2.4, friction=32.0, position_noise=1e-7,
+    inertia_min=1.6, inertia_max=2.4, friction=16.0, viscous=40.0, position_noise=1e-7,
 )  # fmt: skip
 
 

@@ -104,6 +104,17 @@ def test_a_fault_while_it_waits_to_resume_ends_the_waiting() -> None:
     assert layer.force == 0.0
 
 
+def test_no_first_reading_can_be_absurd() -> None:
+    for limits in KINDS:
+        layer, now = SafetyLayer(limits), 10**18
+        for position in (1e308, -1e308, 1e13):
+            for _ in range(10):
+                now += H
+                assert not layer.reading(now, now, position)
+        now += H
+        assert layer.reading(now, now, 0.05)
+
+
 @settings(max_examples=200, deadline=None)
 @given(st.lists(calls, max_size=40))
 def test_nothing_stays_poisoned(sequence: list[tuple[str, float, int, object]]) -> None:

@@ -31,6 +31,7 @@ _NS = 1e-9
 _ABSURD = 1e3  # physical scale: a command so many times the force limit is no control action but an error
 _JUMPS = 3  # numerical: refused as jumps in a row, readings are a fault of the encoder and not a single garbled message
 _BURST = 20  # numerical: commands between two steps; a sender that is only unpunctual doesn't send so many
+_LONGEST_STOP = 1e6  # numerical: stands for a stop without end [s]
 _EVENTS = 256  # numerical: events kept for a caller that doesn't ask for them
 
 
@@ -257,7 +258,7 @@ class SafetyLayer:
         self._deadline = 0
         if self.limits.brakes and self._motion.known:
             fastest = max(self._motion.fastest(now), key=abs)
-            self._deadline = now + round(stop_from(self.limits, fastest, self.force).time / _NS)
+            self._deadline = now + round(min(stop_from(self.limits, fastest, self.force).time, _LONGEST_STOP) / _NS)
 
     # Output
 

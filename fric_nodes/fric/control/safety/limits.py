@@ -22,8 +22,8 @@ _MAY_BE_INFINITE = ("force_rate", "speed", "position_min", "position_max", "foll
 class Limits:
     """Limits of one axis and bounds on its dynamics. Every value is a physical scale of the machine.
 
-    The bounds describe the axis as m dv/dt = F + d with inertia_min <= m <= inertia_max and |d| <= friction + load. With
-    ``inertia_min`` = 0 they are unknown: a stop takes the force away without braking, and motion isn't compared with force.
+    The bounds describe the axis as m dv/dt = F + d with inertia_min <= m <= inertia_max, |d| <= friction + viscous |v| + load.
+    With ``inertia_min`` = 0 they are unknown: a stop takes the force away without braking; no motion is compared with force.
 
     Attributes:
         force: largest force [F].
@@ -35,7 +35,8 @@ class Limits:
         temperature: largest temperature [degC], where it is measured.
         inertia_min: least inertia of the axis [F s^2/x].
         inertia_max: largest inertia of the axis [F s^2/x].
-        friction: largest resistance to motion at any allowed speed, viscous friction included [F].
+        friction: largest resistance to motion that doesn't grow with speed, break-away included [F].
+        viscous: largest growth of the resistance with speed [F s/x].
         load: largest force besides the drive's that can set the axis in motion, such as its weight [F].
         position_noise: largest error of a position reading, half an encoder step included [x].
         latency: largest time from a force's output until it acts, and from a reading's stamp until it is used [s].
@@ -64,6 +65,7 @@ class Limits:
     inertia_min: float = 0.0
     inertia_max: float = math.inf
     friction: float = 0.0
+    viscous: float = 0.0
     load: float = 0.0
     position_noise: float = 0.0
     latency: float = 0.004

@@ -11,19 +11,24 @@ and the same difference of the twice integrated force S (S'' = F) gives the mome
 
 must hold for an m in its range, but for the error of the readings. A reading against it is no motion of this axis: a jump, a
 frozen or reversed encoder, a wrong gear ratio; or the axis hit something.
-D holds friction and load, and what the force may have changed within the latency.
+D holds friction and load, and by how much the force has changed over the window and the latency before it: so far the force
+that acts may be from the one that was given.
 Source: the momentum observer of collision detection (De Luca and Mattone 2005, ICRA, Eq. 12), with bounds in place of a model.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
 from .limits import Limits
 
 __all__ = ["MotionWatch"]
 
 _NS = 1e-9
+_WIDTHS = 10.0  # physical scale: an axis that far outside its range, in widths of it, isn't there but misread
+_FARTHEST = 1e12  # numerical: beyond it, a position in double precision has no digits left for its changes
+_KEPT = 64  # numerical: forces kept at most; a window holds a few
 _REBASE = 256  # numerical: after so many readings the integrals of the force start from zero, so that no digits are lost
 
 
@@ -40,9 +45,13 @@ class MotionWatch:
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
-        late = min(limits.force_rate * limits.latency, 2.0 * limits.force)
-        self._disturbance = limits.friction + limits.load + late
+        self._resistance = limits.friction + limits.load
+        self._latency = round(limits.latency / _NS)
+        self._given: deque[tuple[int, float]] = deque([(0, 0.0)])  # since when [ns], and which force [F]
         self._n = limits.readings
+        width = limits.position_max - limits.position_min
+        ends = max(abs(limits.position_min), abs(limits.position_max))
+        self._farthest = min(ends + _WIDTHS * width, _FARTHEST)
         self._forget_forces(0)
         self.clear()
 
@@ -71,6 +80,12 @@ class MotionWatch:
             self._forget_forces(now)
             self.clear()
         self._changed, self._force = now, force
+        given = self._given
+        given.append((now, force))
+        start = (self._times[0] if self._times else now) - self._latency
+        # The one that was given when the window began stays.
+        while len(given) > 1 and (given[1][0] <= start or len(given) > _KEPT):
+            given.popleft()
 
     def _integrals_at(self, stamp: int) -> tuple[float, float]:
         """Twice and once integrated force at ``stamp`` [ns]."""
@@ -83,7 +98,11 @@ class MotionWatch:
         before, after = (times[second] - times[first]) * _NS, (stamp - times[second]) * _NS
         change = (position - positions[second]) / after - (positions[second] - positions[first]) / before
         given = (integral - integrals[second]) / after - (integrals[second] - integrals[first]) / before
-        around = 0.5 * self._disturbance * (before + after)
+        start = times[first] - self._latency
+        forces = [force for time, force in self._given if time > start] or [self._force]
+        fastest = max(abs(position - positions[second]) / after, abs(positions[second] - positions[first]) / before)
+        bound = self._resistance + limits.viscous * fastest + max(forces) - min(forces)
+        around = 0.5 * bound * (before + after)
         noise = 2.0 * limits.position_noise * (1.0 / before + 1.0 / after)
         least, most = given - around, given + around
         least /= limits.inertia_min if least < 0.0 else limits.inertia_max
@@ -93,16 +112,18 @@ class MotionWatch:
     def jump(self, stamp: int, position: float) -> bool:
         """True when no motion leads from the last readings to ``position`` [x] at ``stamp`` [ns]."""
         times = self._times
+        limits = self._limits
+        if abs(position) > self._farthest:
+            return True
         if not times:
             return False
-        limits = self._limits
         passed = (stamp - times[-1]) * _NS
         way = abs(position - self._positions[-1]) - 2.0 * limits.position_noise
         if not limits.brakes:
             # No more than the speed limit is known: twice that is an overspeed still, and more is none.
             return way > 2.0 * limits.speed * passed
         if len(times) == 1:
-            fastest = 2.0 * limits.speed + (limits.force + self._disturbance) / limits.inertia_min * passed
+            fastest = 2.0 * limits.speed + (limits.force + self._resistance) / limits.inertia_min * passed
             return way > fastest * passed
         return self._outside(-2, -1, stamp, position, self._integrals_at(stamp)[0])
 
