@@ -103,6 +103,22 @@ def test_a_short_gap_is_bridged_without_integrating_over_it(late: float) -> None
     assert np.abs(loop.errors[at:]).max() < 1e-3
 
 
+def test_states_that_stay_later_than_before_are_answered_again() -> None:
+    loop = Loop()
+    loop.go(2.0)
+    loop.go(0.5, held_up=True)
+    loop.queue.clear()
+    answered = 0
+    for _ in range(200):
+        loop.now += H
+        loop.references.take(loop.now, loop.now, *motion(1e-9 * (loop.now - loop.origin)))
+        measured = loop.axis.measure().position
+        force = loop.guard.answer(loop.now + 6 * H, loop.now, measured)  # 12 ms late from now on
+        answered += force is not None
+        loop.axis.advance(force or 0.0, DT)
+    assert answered > 150
+
+
 def test_a_controller_whose_state_is_not_finite_resets_and_says_so() -> None:
     loop = Loop()
     loop.go(2.0)

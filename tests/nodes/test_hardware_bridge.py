@@ -110,8 +110,12 @@ def test_commands_act_only_when_enabled_and_every_cause_is_named(
     graph.until(lambda: emulator.force == 5.0, "it moves again")
     # A second publisher.
     other = graph.node("intruder")
-    other.create_publisher(Float64, "force_command", DEEP)
-    graph.until(partner.says("second command source (2 publishers)"), "the second publisher is named")
+    second = other.create_publisher(Float64, "force_command", DEEP)
+    time.sleep(0.2)
+    assert emulator.force == 5.0  # as long as it is silent, nothing happens: a process that was killed looks like that
+    other.create_timer(0.005, lambda: second.publish(Float64(data=40.0)))
+    graph.spin(other)
+    graph.until(partner.says("second command source (2 publishers"), "the second publisher is named")
     graph.until(lambda: emulator.force == 0.0, "and stops the axis")
 
 

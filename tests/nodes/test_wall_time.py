@@ -192,3 +192,25 @@ def test_controller_refuses_bad_states_and_stops_with_them(graph: Graph) -> None
     assert listener.commands[-1] > 0.0
     time.sleep(0.2)
     assert len(listener.commands) == answers + 1
+
+
+def test_a_second_publisher_gets_no_force_and_is_named(graph: Graph) -> None:
+    listener = Listener(graph)
+    plant = _make(graph, PlantNode, model_file=_model_file(graph.folder), diagnostics_period=0.1)
+    other = graph.node("intruder")
+    second = other.create_publisher(Float64, "force_command", 10)
+    graph.spin(plant, kind=EventsExecutor)
+    graph.meet(listener.node, plant, other)
+
+    def push() -> bool:
+        """Both command, more often than there are samples."""
+        for _ in range(3):
+            listener.forces.publish(Float64(data=1.0))
+            second.publish(Float64(data=40.0))
+        return False
+
+    named = "refused command: second source"
+    graph.until(lambda: push() or named in listener.reports.get("plant", {}), "the second source is named")
+    count = len(listener.states)
+    graph.until(lambda: push() or len(listener.states) > count + 20, "states after it")
+    assert all(effort == 0.0 for _, _, effort in listener.states[-5:])

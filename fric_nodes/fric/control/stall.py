@@ -72,6 +72,7 @@ class StallGuard:
         self._running = False
         self._received: int | None = None
         self._paused = False
+        self._resumed = 0
         self._usual_age = 0.0
         self._force = 0.0
 
@@ -130,9 +131,11 @@ class StallGuard:
         """Why a state is one of those that queued up during a pause; empty when it isn't."""
         age, period = (now - stamp) * _NS, self._limits.period
         if self._received is not None and (now - self._received) * _NS > self._limits.bridge:
-            self._paused = True
+            self._paused, self._resumed = True, now
         self._received = now
-        if self._paused and age > self._usual_age + _JITTER * period:
+        # What queued up is worked off at once; ages that stay higher than they were are those of a busier machine.
+        working_off = (now - self._resumed) * _NS <= self._limits.age
+        if self._paused and working_off and age > self._usual_age + _JITTER * period:
             return "too old"
         self._paused = False
         self._usual_age += _SMOOTH * (age - self._usual_age)

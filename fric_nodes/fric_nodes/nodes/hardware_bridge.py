@@ -111,7 +111,7 @@ class HardwareBridgeNode(LoopNode):
 
     def _on_command(self, message: StampedForce | Float64) -> None:
         now, layer = self._now(), self._layer
-        layer.publishers(now, self._commands.get_publisher_count())
+        layer.publishers(self._commands.get_publisher_count())
         try:
             stamp, force = force_in(message)
         except MessageError:

@@ -24,11 +24,10 @@ from fric_interfaces.msg import StampedForce
 from ..axis_output import AxisOutput, ModelSwitch
 from ..axis_parameters import AXIS, simulated_axis
 from ..convert import from_seconds
-from ..forces import STAMPED, force_in, force_type
+from ..forces import STAMPED, SenderCheck, force_in
 from ..lockstep import Stream
 from ..loop import LOCK_STEP, PERIOD, LoopNode, wall_clock
 from ..parameters import NodeParameter
-from ..qos import SAMPLES
 from ..run import run
 
 __all__ = ["PlantNode", "main"]
@@ -61,7 +60,7 @@ class PlantNode(LoopNode):
         self._sample = 0
         self._output = AxisOutput(self, self._axis)
         self._model = ModelSwitch(self, self._axis, self._output)
-        self.create_subscription(force_type(self), "force_command", self._on_command, SAMPLES)
+        self._senders = SenderCheck(self, self._on_command)
         if self.lock_step:
             self._period_ns = from_seconds(self.period)
             self._commands: Stream[float] = Stream()
@@ -76,8 +75,8 @@ class PlantNode(LoopNode):
 
     def condition(self) -> Mapping[str, object]:
         """What the node adds to its report."""
-        since = f"{1e-9 * self._model.since:.6f}"
-        return {"samples": self._sample, "saturated": self._axis.saturated, "model since [s]": since}
+        since = {"model since [s]": f"{1e-9 * self._model.since:.6f}"}
+        return {"samples": self._sample, "saturated": self._axis.saturated, **since}
 
     def _end(self) -> None:
         self._output.wait_until_sent(_DELIVERY)
@@ -90,7 +89,7 @@ class PlantNode(LoopNode):
         if self.lock_step:
             self._commands.put(*command)
             self._go_on()
-        else:
+        elif self._senders.alone():
             self._count_watchdog(self._drive.command(time.monotonic_ns(), command[1]))
 
     # Lock-step
@@ -133,6 +132,7 @@ class PlantNode(LoopNode):
             return
         now = time.monotonic_ns()
         self._count_watchdog(self._drive.advance_to(now))
+        self._senders.sample()
         if not self.has_audience(self._output.publisher):
             return
         if self._sample == 0:

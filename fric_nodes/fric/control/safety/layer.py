@@ -22,6 +22,7 @@ from .guard import guarded
 from .hold import Hold
 from .limits import Limits, SafetyError
 from .motion import MotionWatch
+from .senders import SenderWatch
 from .stamps import StampGate
 from .stopping import brake_force, stop_from
 
@@ -86,6 +87,8 @@ class SafetyLayer:
         self._commands.newest = self._states.newest = None
         self._refused: dict[str, str] = {}
         self._jumps = self._contradictions = self._burst = 0
+        self._publishers = 1
+        self._senders = SenderWatch()
         self._blind = False
         self._resuming = False
         self._asked = self._deadline = 0
@@ -112,13 +115,13 @@ class SafetyLayer:
         self._commands.newest = stamp
         self._wanted = force
         self._burst += 1
+        self._senders.command()
         self._refused.pop("command", None)
         return True
 
-    def publishers(self, now: int, count: int) -> None:
-        """So many senders of commands are known; more than one is a fault while enabled."""
-        if count > 1 and self.state is State.ENABLED:
-            self.fail("second command source", f"{count} publishers", now)
+    def publishers(self, count: int) -> None:
+        """So many senders of commands are known; more than one at work is a fault."""
+        self._publishers = count
 
     def reading(self, now: int, stamp: int, position: float, temperature: float = math.nan) -> bool:
         """Take in a joint state, measured at ``stamp`` [ns] and received at ``now`` [ns]; False: refused.
@@ -301,6 +304,9 @@ class SafetyLayer:
         if self._burst > _BURST:
             self.counters["command burst"] += 1
         self._burst = 0
+        if self._senders.sample(self._publishers):
+            self.fail("second command source", f"{self._publishers} publishers, more commands than samples", now)
+            return
         newest = self._commands.newest
         since = self._asked if newest is None else max(newest, self._asked)
         if self._states.lost(now):
