@@ -68,7 +68,7 @@ class CompensatorNode(LoopNode):
         self._intake = ModelIntake(self, self._checked, self._feedforward.set_model)
         settings.when_changed(self._on_settings)
         self._forces = ForcePublisher(self, "feedforward_force")
-        self._clock, self._watch = StampClock(self), reference_guard(settings)
+        self._stamps, self._watch = StampClock(self), reference_guard(settings)
         self._watch.counters = self.counters
         self._answers: Answers[ReferencePoint, float] = Answers()
         self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
@@ -106,7 +106,7 @@ class CompensatorNode(LoopNode):
         if self.lock_step:
             self._on_step(reference)
             return
-        why = self._watch.take(self._clock(), *reference)
+        why = self._watch.take(self._stamps(), *reference)
         if why:
             self.get_logger().warning(f"refused reference: {why}", throttle_duration_sec=1.0)
             return

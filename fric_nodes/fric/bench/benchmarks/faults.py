@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..benchmark import Benchmark, Figure
+from ...figure import Figure
+from ..benchmark import Benchmark
 from ..fault_rig import FaultRig, Outcome
 from ..faults import FAULTS, Fault, inject
 
