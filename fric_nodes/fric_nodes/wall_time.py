@@ -18,6 +18,7 @@ from .parameters import NodeParameter, Settings
 __all__ = ["REFERENCES", "STATES", "StampClock", "WallControl", "reference_guard"]
 
 _FAR = 1e6  # physical scale: beyond any axis; stands for no limit of its own, and still refuses 1e300
+_OVER = 1.0  # physical scale: [s] without another one, after which something is over
 REFERENCES = (
     NodeParameter(
         "reference_timeout", 0.1, "wall time: without a reference for so long the axis is brought to rest", "s", 1e-3, 1e6
@@ -93,7 +94,7 @@ class WallControl:
         self._references.counters = self._guard.counters = node.counters
         self._before: Counter[str] = Counter()
         self._total = 0
-        self._said = ""
+        self._lasting: dict[str, float] = {}  # what goes on, and when it was last counted [s]
 
     def reference(self, reference: ReferencePoint) -> None:
         """Take in a reference."""
@@ -112,17 +113,17 @@ class WallControl:
         return self._references.following.value
 
     def _log(self) -> None:
-        """Say once when something is refused or lost, and once when it is over."""
-        counters = self._node.counters
+        """Say once when something begins to be refused or lost, and once when it is over."""
+        counters, now = self._node.counters, time.monotonic()
         total = sum(counters.values())
-        if total == self._total:
-            lost = "reference lost" if self._references.lost else ""
-            if self._said and not lost:
-                self._node.get_logger().info(f"over: {self._said}")
-                self._said = ""
-            return
-        grown = ", ".join(name for name, count in counters.items() if count > self._before[name])
-        self._total, self._before = total, Counter(counters)
-        if grown != self._said:
-            self._said = grown
-            self._node.get_logger().warning(grown)
+        if total != self._total:
+            for name, count in counters.items():
+                if count > self._before[name]:
+                    if name not in self._lasting:
+                        self._node.get_logger().warning(name)
+                    self._lasting[name] = now
+            self._total, self._before = total, Counter(counters)
+        elif self._lasting:
+            for name in [name for name, last in self._lasting.items() if now - last > _OVER]:
+                del self._lasting[name]
+                self._node.get_logger().info(f"over: {name}")
