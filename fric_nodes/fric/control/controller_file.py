@@ -9,8 +9,8 @@
     controller: {type: pid, proportional: 1.0e+5, integral: 1.0e+6, derivative: 400.0, filter_time: 5.0e-4}
     feedforward: {model: model.yaml}    # relative to this file; terms: [coulomb, viscous] takes these only
 
-The types are those of :data:`fric.control.feedbacks.CONTROLLERS`, each with the parameters that it declares, and those whose gains
-come from a design file with ``design``, its path relative to this file.
+The types are those of :data:`fric.control.feedbacks.CONTROLLERS`, each with the parameters that it declares, and those whose
+gains come from a design file with ``design``, its path relative to this file.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
 """Tensor-product control of Szell's cylinder against a PID controller, and random designs against their own claims.
 
-Stick-slip: the piston of ``config/pneumatic_model.yaml`` is to go to a position and stay there, under a constant load. Start, target,
-load and the pressures at the start are drawn at random. Both controllers move the valve once a millisecond and read an encoder of 1 um; the
-tensor-product controller reads the two pressure sensors too. A controller hunts when the piston still moves in the last second of five.
-The PID controller's gains are those of a loop without friction: proportional at 0.4 of the gain at which that loop oscillates, integral
-over 0.25 s, derivative over 12.5 ms. So that the comparison isn't one of integrals that rest, a PID whose integral rests
-within the same tolerance stands beside it.
+Stick-slip: the piston of ``config/pneumatic_model.yaml`` is to go to a position and stay there, under a constant load. Start,
+target, load and the pressures at the start are drawn at random. Both controllers move the valve once a millisecond and read
+an encoder of 1 um; the tensor-product controller reads the two pressure sensors too. A controller hunts when the piston still
+moves in the last second of five. The PID controller's gains are those of a loop without friction: proportional at 0.4 of the
+gain at which that loop oscillates, integral over 0.25 s, derivative over 12.5 ms. So that the comparison isn't one of
+integrals that rest, a PID whose integral rests within the same tolerance stands beside it.
 
-Random designs: masses on friction with a Stribeck curve and hysteresis, drawn over two decades. Of each that is accepted the vertices'
-eigenvalues are calculated anew by numpy from the saved file's text, and the plant with its own friction law, not the polytope,
-is integrated from the edge of the guaranteed ellipsoid: V has to fall at least as fast as designed.
+Random designs: masses on friction with a Stribeck curve and hysteresis, drawn over two decades. Of each that is accepted the
+vertices' eigenvalues are calculated anew by numpy from the saved file's text, and the plant with its own friction law, not
+the polytope, is integrated from the edge of the guaranteed ellipsoid: V has to fall at least as fast as designed.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def random_plant(seed: int) -> tuple[Polytope, Requirements]:
     friction = from_law(law(1.0), law(random.uniform(0.0, 1.0)), mass, velocity_grid(0.5, 1000))
     plant = mass_on_friction(friction, slowest=10.0 ** random.uniform(-2.7, -2.0), fastest=0.5, error=0.01)
     limit = (coulomb + surplus) * random.uniform(3.0, 30.0)
-    return polytope(plant), Requirements(decay=random.uniform(0.5, 10.0), limit=limit)
+    return polytope(plant), Requirements(decay=10.0 ** random.uniform(-0.3, 2.0), limit=limit)
 
 
 def random_design(seed: int) -> tuple[Polytope, TensorProductController] | None:

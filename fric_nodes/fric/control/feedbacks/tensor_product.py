@@ -4,8 +4,8 @@ Its gains come from a design file (``fric-tp-controller/1``), which a controller
 
     controller: {type: tensor_product, design: tp.yaml, filter_time: 0.002, tolerance: 1.0e-5}
 
-The law is :class:`fric.control.tensor_product.law.TensorProductLaw`. It reads the position alone: a design that has the force of
-the actuator for a state is for programs that measure it, and is refused here.
+The law is :class:`fric.control.tensor_product.law.TensorProductLaw`. It reads the position alone: a design that has the force
+of the actuator for a state is for programs that measure it, and is refused here.
 Source: Szell, Sec. 2 (polytopic model); Tanaka and Wang 2001, chapter 3 (parallel distributed compensation).
 """
 

@@ -1,14 +1,14 @@
 """A tensor-product controller in one call: vertices, linear matrix inequalities, proof.
 
-1. Free gains: the largest margin in X and gains together. Without a margin there is no quadratic Lyapunov function with the asked
-   decay rate, and the refusal names the vertex pair that weighs most and what would help.
+1. Free gains: the largest margin in X and gains together. Without a margin there is no quadratic Lyapunov function with the
+   asked decay rate, and the refusal names the vertex pair that weighs most and what would help.
 2. Gains of the plant's common states are made the same at every vertex: gains for this X, then X for these gains, in turn until
    both conditions leave a margin. This is a local search; it may miss a solution, never claims a wrong one.
 3. :mod:`.certificate` proves decay rate and input bound for the numbers as they are used.
 
 The guarantee: in continuous time, the state x within the ellipsoid V <= 1, and S(p) within the polytope, V falls at least
-with exp(-2 alpha t) and the command keeps its limit. Friction slower than the slowest velocity counts as viscous in it: a body that
-sticks is outside of what is proved, and a simulation has to show what it does then.
+with exp(-2 alpha t) and the command keeps its limit. Friction slower than the slowest velocity counts as viscous in it: a
+body that sticks is outside of what is proved, and a simulation has to show what it does then.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class Requirements:
     Attributes:
         decay: rate at which the state is to fall at least [1/s].
         limit: largest command, of the plant's command [F] or [1].
-        region: radius of the ball that the guaranteed ellipsoid must hold, of the states over their domain [1]. A larger one asks
-            for smaller gains.
+        region: radius of the ball that the guaranteed ellipsoid must hold, of the states over their domain [1]. A larger one
+            asks for smaller gains.
         solver: of cvxpy.
     """
 
@@ -156,11 +156,10 @@ def design(held: Polytope, requirements: Requirements) -> TensorProductControlle
     p = _lyapunov_matrix(found)
     certificate = certify(problem.a, problem.b, found.k, p)
     if certificate.decay < requirements.decay or not certificate.input_bound:
-        i, j, _ = certificate.pair
+        least = f"decay rate {certificate.decay:.3g} 1/s, least at {_pair_name(held, certificate.pair)}"
         raise TensorProductControlError(
             "tensor-product design",
-            f"{requirements.solver}'s answer can't be proved (decay rate {certificate.decay:.3g} 1/s, least at the vertex pair "
-            f"{held.vertex_name(i)} and {held.vertex_name(j)})",
+            f"{requirements.solver}'s answer can't be proved ({least})",
             "try another solver, or lower the decay rate a little",
         )
     plant = held.plant
@@ -173,6 +172,8 @@ def design(held: Polytope, requirements: Requirements) -> TensorProductControlle
 def _lyapunov_matrix(found: Solution) -> Array:
     """P, with the ellipsoid V <= 1 no larger than domain and command allow, whatever the solver's tolerance was."""
     x = 0.5 * (found.x + found.x.T)
+    if not float(np.linalg.eigvalsh(x)[0]) > 0.0:
+        return x  # which the certificate refuses
     largest = max(float(np.linalg.eigvalsh(x)[-1]), float(np.max(np.einsum("ra,ab,rb->r", found.k, x, found.k))))
     p = np.linalg.inv(x) * max(1.0, largest) * (1.0 + _LEFT)
     return np.asarray(0.5 * (p + p.T))
@@ -198,8 +199,14 @@ def _names(held: Polytope) -> str:
     return " and ".join(held.plant.states[k] for k in held.plant.common)
 
 
+def _pair_name(held: Polytope, at: tuple[int, int, int]) -> str:
+    i, j = sorted(at[:2])
+    if i == j:
+        return f"vertex {held.vertex_name(i)}"
+    return f"the vertex pair {held.vertex_name(i)} and {held.vertex_name(j)}"
+
+
 def _refusal(held: Polytope, requirements: Requirements, found: Solution, beside: str = "") -> TensorProductControlError:
-    i, j, _ = found.worst
     remedies = []
     for text, changed in (
         (f"the decay rate to {requirements.decay / 2:.3g} 1/s", replace(requirements, decay=requirements.decay / 2)),
@@ -217,8 +224,5 @@ def _refusal(held: Polytope, requirements: Requirements, found: Solution, beside
     slowest = float(np.min(np.abs(speed)))
     remedy = f"relax {' or '.join(remedies)}" if remedies else "relax the decay rate further"
     remedy += f", or raise the slowest velocity above {slowest:.3g}"
-    problem_text = (
-        f"no gains reach the decay rate {requirements.decay:g} 1/s{beside}; the vertex pair {held.vertex_name(i)} and "
-        f"{held.vertex_name(j)} stands against it most"
-    )
-    return TensorProductControlError("tensor-product design", problem_text, remedy)
+    what = f"no gains reach the decay rate {requirements.decay:g} 1/s{beside}; {_pair_name(held, found.worst)} limits it most"
+    return TensorProductControlError("tensor-product design", what, remedy)

@@ -124,7 +124,9 @@ def controller_from_text(text: str, source: str = "tensor-product controller") -
     if proof.decay < entry.decay or not proof.input_bound:
         i, j, _ = proof.pair
         lost = f"decay rate {proof.decay:.4g} 1/s" if proof.decay < entry.decay else "a command beyond the limit"
-        problem = f"the proof of {entry.decay:g} 1/s within the limit fails: {lost}, least at the vertex pair {i + 1} and {j + 1}"
+        problem = (
+            f"the proof of {entry.decay:g} 1/s within the limit fails: {lost}, least at the vertex pair {i + 1} and {j + 1}"
+        )
         raise TensorProductControlError(source, problem, "design it again")
     return TensorProductController(
         tuple(entry.states), np.array(entry.domain), entry.limit, entry.input, (entry.units.position, entry.units.force),
@@ -146,7 +148,9 @@ def _table(entry: _Table, source: str) -> tuple[str, Array, Array]:
     if np.any(np.diff(grid) <= 0.0):
         raise TensorProductControlError(source, f"the grid of {entry.name} doesn't increase", "sort it and drop what is double")
     if np.max(np.abs(weights.sum(axis=1) - 1.0)) > _CONVEX or np.min(weights) < -_CONVEX:
-        raise TensorProductControlError(source, f"the weights of {entry.name} aren't convex", "let each row sum to one, none below 0")
+        raise TensorProductControlError(
+            source, f"the weights of {entry.name} aren't convex", "let each row sum to one, none below 0"
+        )
     return entry.name, grid, weights
 
 

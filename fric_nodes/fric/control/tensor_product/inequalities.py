@@ -1,10 +1,11 @@
-r"""The linear matrix inequalities of parallel distributed compensation, as semidefinite programs.
+"""The linear matrix inequalities of parallel distributed compensation, as semidefinite programs.
 
 For x' = sum_i sum_j w_i w_j (A_i + B_i K_j) x let V = x' P x, X = P^-1 and, with the decay rate alpha,
 
     Q_ij = (A_i + B_i K_j) X + X (A_i + B_i K_j)' + 2 alpha X.
 
-V falls at least as exp(-2 alpha t) when sum_i sum_j w_i w_j Q_ij < 0, for which it is enough that (Tuan et al. 2001, Theorem 2.2)
+V falls at least as exp(-2 alpha t) when sum_i sum_j w_i w_j Q_ij < 0, for which it is enough that (Tuan et al. 2001, Theorem
+2.2)
 
     Q_ii < 0   and   2/(r-1) Q_ii + Q_ij + Q_ji < 0   for all i != j.
 
@@ -13,10 +14,11 @@ The command stays within 1 (per unit) in the ellipsoid V <= 1 when [X, M_j'; M_j
 ellipsoid in the domain of the states, and X >= region^2 makes it hold a ball of that radius.
 
 Not feasibility but the margin is asked for: the largest t with all conditions at most -t. As X <= 1, V then falls with the rate
-alpha + t/2. Three programs are linear: in (X, M) with free gains, in K for given P, where gains of some states may be made common to all
-vertices, and in X for given K. All are in states over their domain and commands over their limit.
-Source: Tuan, Apkarian, Narikiyo, Yamamoto, IEEE Trans. Fuzzy Systems 9 (2001) 324; Tanaka and Wang, Fuzzy Control Systems Design
-and Analysis, 2001, chapter 3; Boyd et al., Linear Matrix Inequalities in System and Control Theory, 1994, chapters 5 and 7.
+alpha + t/2. Three programs are linear: in (X, M) with free gains, in K for given P, where gains of some states may be made
+common to all vertices, and in X for given K. All are in states over their domain and commands over their limit.
+Source: Tuan, Apkarian, Narikiyo, Yamamoto, IEEE Trans. Fuzzy Systems 9 (2001) 324; Tanaka and Wang, Fuzzy Control Systems
+Design and Analysis, 2001, chapter 3; Boyd et al., Linear Matrix Inequalities in System and Control Theory, 1994, chapters 5
+and 7.
 """
 
 from __future__ import annotations
@@ -32,6 +34,9 @@ from ...record import Array
 from .quasi_lpv import TensorProductControlError
 
 __all__ = ["Problem", "Solution", "for_gains", "for_lyapunov", "for_lyapunov_and_gains", "pairs"]
+
+_OPTIONS: dict[str, dict[str, Any]] = {"SCS": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iters": 100_000}}
+"""Numerical tolerances of a first-order method: its own default is too coarse for a proof."""
 
 _LARGEST = 1e6  # numerical: bound of the margin [1/s], so that a program is never unbounded
 
@@ -123,10 +128,12 @@ def _solve(solver: str, blocks: Sequence[Array], n_unknowns: int, order: Sequenc
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # an inaccurate answer is found by the certificate
         try:
-            program.solve(solver=solver)
+            program.solve(solver=solver, **_OPTIONS.get(solver, {}))
         except cp.error.SolverError as error:
             problem = f"{solver} gives up ({str(error).splitlines()[0]})"
-            raise TensorProductControlError("linear matrix inequalities", problem, "try another solver or other scales") from None
+            raise TensorProductControlError(
+                "linear matrix inequalities", problem, "try another solver or other scales"
+            ) from None
     if z.value is None:
         problem = f"{solver} finds no answer ({program.status})"
         raise TensorProductControlError("linear matrix inequalities", problem, "lower the region or the decay rate")
@@ -201,6 +208,9 @@ def for_gains(problem: Problem, x: Array) -> Solution:
     """Margin and gains for a given X; gains of common states are one unknown each. The margin is that of V itself."""
     r, _, n = problem.shape
     values, vectors = np.linalg.eigh(x)
+    if values[0] <= 0.0:
+        problem_text = f"{problem.solver}'s X isn't positive definite (smallest eigenvalue {values[0]:.2g})"
+        raise TensorProductControlError("linear matrix inequalities", problem_text, "try another solver or a larger region")
     root, inverse = (vectors * values**power @ vectors.T for power in (0.5, -0.5))
     free = [k for k in range(n) if k not in problem.common]
     n_unknowns = len(problem.common) + r * len(free) + 1

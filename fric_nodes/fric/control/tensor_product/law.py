@@ -6,8 +6,9 @@ Equation, at sample k with the error e_k = y_k - r_k, the measured velocity v_k 
     xi_k = xi_(k-1) + h e_k      while |e_k| > tolerance
     u_k  = clip(sum_i w_i(v_k, y_k) K_i [xi_k, e_k, v_k - w_k, f_k] + forward),   w_k the velocity wanted
 
-The integral stands still where it would drive a limited output further beyond its limit. Within the tolerance it stands still too:
-an integral that never rests makes any body stick and slip for ever whose static friction is larger than its sliding friction.
+The integral stands still where it would drive a limited output further beyond its limit. Within the tolerance it stands still
+too: an integral that never rests makes any body stick and slip for ever whose static friction is larger than its sliding
+friction.
 """
 
 from __future__ import annotations
@@ -101,7 +102,9 @@ class TensorProductLaw:
             TensorProductControlError: an input isn't finite, or the duration isn't positive; the state is left as it was.
         """
         if not all(map(math.isfinite, (*wanted, measured, force, feedforward))) or not 0.0 < duration < math.inf:
-            given = f"measured {measured}, force {force}, feedforward {feedforward}, duration {duration}, wanted {tuple(wanted)}"
+            given = (
+                f"measured {measured}, force {force}, feedforward {feedforward}, duration {duration}, wanted {tuple(wanted)}"
+            )
             raise TensorProductControlError("tensor-product controller", f"an input can't be used ({given})", "leave it out")
         before = measured if self._before is None else self._before
         self._velocity = (self.filter_time * self._velocity + measured - before) / (self.filter_time + duration)

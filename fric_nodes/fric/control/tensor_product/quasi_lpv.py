@@ -1,12 +1,13 @@
 """Plants with friction as quasi-LPV systems: linear in the state, with matrices that depend on what moves.
 
 Equation: x' = A(p) x + B(p) u with the state x = (xi, e, v, ...), e = q - r the error of a position that is to stay at r, and
-xi' = e. Friction is the element a_22(p) = -F(v)/(v m) of Szell's Eq. 18. Its hysteresis (Eq. 23) is a parameter g from g_min to 1:
+xi' = e. Friction is the element a_22(p) = -F(v)/(v m) of Szell's Eq. 18. Its hysteresis (Eq. 23) is a parameter g from g_min
+to 1:
 
     a_22(v, g) = a_0 + g (a_top(v) - a_0),
 
-a_top the branch with more damping, a_0 less damping than either has anywhere. Each branch is such a g at each velocity, g_min is the
-least of them. So two weights over the velocity serve both branches; from the branches themselves it would take three.
+a_top the branch with more damping, a_0 less damping than either has anywhere. Each branch is such a g at each velocity, g_min
+is the least of them. So two weights over the velocity serve both branches; from the branches themselves it would take three.
 
 - Mass on friction: v' = a_22 v + u/m, the command u a force.
 - Pneumatic cylinder: v' = a_22 v + f/m with the force of the air f = A (p_a - p_b), of which Eqs. 13, 14 make
@@ -14,7 +15,8 @@ least of them. So two weights over the velocity serve both branches; from the br
   b u is the change by both mass flows, b the mean over u > 0 and u < 0, without the valve's overlap.
 
 A parameter is scheduled when the gains may follow it at run time. The others are only known to lie in their range: speeding up
-isn't told from slowing down by a noisy velocity, and the mean pressure isn't measured. One set of gains serves all their values.
+isn't told from slowing down by a noisy velocity, and the mean pressure isn't measured. One set of gains serves all their
+values.
 
 A constant load shifts the equilibrium in xi and f. Gains of these states that changed with p would turn the shift into a
 disturbance, so they are the same at every vertex (``common``).
