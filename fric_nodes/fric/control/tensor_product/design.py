@@ -40,7 +40,8 @@ class Requirements:
         limit: largest command, of the plant's command [F] or [1].
         region: radius of the ball that the guaranteed ellipsoid must hold, of the states over their domain [1]. A larger one
             asks for smaller gains.
-        solver: of cvxpy.
+        solver: of cvxpy: ``CLARABEL``, or ``CVXOPT`` where it is installed. SCS, of first order, doesn't get as far as a proof
+            with the rates that friction has.
     """
 
     decay: float

@@ -112,6 +112,10 @@ def controller_from_text(text: str, source: str = "tensor-product controller") -
     if entry.states != _STATES[:n] or len(entry.domain) != n:
         raise TensorProductControlError(source, f"states {entry.states}", f"give {', '.join(_STATES)}, or the first three")
     tables = tuple(_table(each, source) for each in entry.scheduling)
+    if [table[0] for table in tables] != ["velocity", "position"][: len(tables)]:
+        raise TensorProductControlError(
+            source, "the scheduling isn't that of a design", "give velocity, or velocity and position"
+        )
     if int(np.prod([table[2].shape[1] for table in tables])) != r:
         raise TensorProductControlError(source, f"{r} vertices for these weights", "give one for each combination of weights")
     a = _array([[v.a for v in each.variants] for each in entry.vertices], (r, -1, n, n), source, "a")

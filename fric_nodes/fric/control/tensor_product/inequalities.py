@@ -35,9 +35,6 @@ from .quasi_lpv import TensorProductControlError
 
 __all__ = ["Problem", "Solution", "for_gains", "for_lyapunov", "for_lyapunov_and_gains", "pairs"]
 
-_OPTIONS: dict[str, dict[str, Any]] = {"SCS": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iters": 100_000}}
-"""Numerical tolerances of a first-order method: its own default is too coarse for a proof."""
-
 _LARGEST = 1e6  # numerical: bound of the margin [1/s], so that a program is never unbounded
 
 
@@ -51,7 +48,7 @@ class Problem:
         decay: alpha [1/s].
         region: radius of the ball that the ellipsoid must hold [1].
         common: numbers of the states whose gain is the same at every vertex.
-        solver: of cvxpy, such as ``CLARABEL`` or ``SCS``.
+        solver: of cvxpy, an interior-point method: ``CLARABEL``, or ``CVXOPT`` where it is installed.
     """
 
     a: Array
@@ -121,14 +118,15 @@ def _solve(solver: str, blocks: Sequence[Array], n_unknowns: int, order: Sequenc
     constraints = [z[n_unknowns - 1] <= _LARGEST]
     for block in blocks:
         m = block.shape[1]
-        flat = block.reshape(1 + n_unknowns, m * m)
-        size = float(np.max(np.abs(flat)))
-        constraints.append(cp.reshape((flat[1:].T / size) @ z + flat[0] / size, (m, m), order="C") << 0)
+        # A congruence with a diagonal matrix changes no sign; friction's rate makes rows that are 10^4 times others'.
+        rows = np.sqrt(np.max(np.abs(block), axis=(0, 2)))
+        flat = (block / (rows * rows[:, None])).reshape(1 + n_unknowns, m * m)
+        constraints.append(cp.reshape(flat[1:].T @ z + flat[0], (m, m), order="C") << 0)
     program = cp.Problem(cp.Maximize(z[n_unknowns - 1]), constraints)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # an inaccurate answer is found by the certificate
         try:
-            program.solve(solver=solver, **_OPTIONS.get(solver, {}))
+            program.solve(solver=solver)
         except cp.error.SolverError as error:
             problem = f"{solver} gives up ({str(error).splitlines()[0]})"
             raise TensorProductControlError(
@@ -139,8 +137,10 @@ def _solve(solver: str, blocks: Sequence[Array], n_unknowns: int, order: Sequenc
         raise TensorProductControlError("linear matrix inequalities", problem, "lower the region or the decay rate")
     weights = []
     for k in range(len(order)):
+        # Weights of the margin, which is the last unknown: multiplier times its coefficient.
         dual = constraints[1 + k].dual_value
-        weights.append(0.0 if dual is None else float(np.trace(np.atleast_2d(dual))) / float(np.max(np.abs(blocks[k]))))
+        rows = np.max(np.abs(blocks[k]), axis=(0, 2))
+        weights.append(0.0 if dual is None else float(np.sum(np.diag(np.atleast_2d(dual)) / rows)))
     return np.asarray(z.value), order[int(np.argmax(weights))]
 
 
@@ -201,7 +201,8 @@ def for_lyapunov_and_gains(problem: Problem) -> Solution:
         blocks.append(limit)
     z, worst = _solve(problem.solver, blocks, n_unknowns, order)
     x = np.tensordot(z[:nx], basis, axes=1)
-    return Solution(float(z[-1]), x, np.linalg.solve(x, z[nx:-1].reshape(r, n).T).T, worst)
+    gains = np.asarray(np.linalg.solve(x, z[nx:-1].reshape(r, n).T).T, dtype=np.float64)
+    return Solution(float(z[-1]), x, gains, worst)
 
 
 def for_gains(problem: Problem, x: Array) -> Solution:
@@ -222,7 +223,7 @@ def for_gains(problem: Problem, x: Array) -> Solution:
             chosen[at, k] = 1.0
         for at, k in enumerate(free):
             chosen[len(problem.common) + j * len(free) + at, k] = 1.0
-        return chosen @ root
+        return np.asarray(chosen @ root)
 
     def q(i: int, j: int, h: int) -> Array:
         block = np.zeros((1 + n_unknowns, n, n))

@@ -25,6 +25,22 @@ from .quasi_lpv import TensorProductControlError
 __all__ = ["TensorProductLaw"]
 
 
+def _at_grid(controller: TensorProductController) -> list[list[list[float]]]:
+    """Gains at each velocity and position of the grid: weights are linear between its points, and so are gains."""
+    sizes = [weights.shape[1] for _, _, weights in controller.tables]
+    gains = controller.physical_gains.reshape(*sizes, -1)
+    gains = np.tensordot(controller.tables[0][2], gains, axes=1)
+    gains = gains[:, None] if len(sizes) == 1 else np.einsum("xj,vjn->vxn", controller.tables[1][2], gains)
+    held: list[list[list[float]]] = gains.tolist()
+    return held
+
+
+def _between(grid: list[float], at: float) -> tuple[int, float]:
+    """The interval of ``grid`` that holds ``at``, and how far along it; beyond an end, that end."""
+    k = min(max(bisect_right(grid, at) - 1, 0), len(grid) - 2)
+    return k, min(max((at - grid[k]) / (grid[k + 1] - grid[k]), 0.0), 1.0)
+
+
 class TensorProductLaw:
     """A tensor-product controller with its state.
 
@@ -56,8 +72,10 @@ class TensorProductLaw:
         self.velocity_weight = velocity_weight
         self.saturated = 0
         self.takes_force = "force" in controller.states
-        self._tables = [(name, grid.tolist(), weights) for name, grid, weights in controller.tables]
-        self._gains = controller.physical_gains
+        grids = {name: grid.tolist() for name, grid, _ in controller.tables}
+        self._velocities: list[float] = grids["velocity"]
+        self._positions: list[float] | None = grids.get("position")
+        self._gains = _at_grid(controller)
         self.reset()
 
     def reset(self) -> None:
@@ -77,18 +95,16 @@ class TensorProductLaw:
 
     def gains(self, velocity: float, position: float) -> list[float]:
         """The interpolated gains, in the order of the states."""
-        share = np.ones(1)
-        for name, grid, weights in self._tables:
-            at = velocity if name == "velocity" else position
-            k = min(max(bisect_right(grid, at) - 1, 0), len(grid) - 2)
-            part = min(max((at - grid[k]) / (grid[k + 1] - grid[k]), 0.0), 1.0)
-            share = np.outer(share, (1.0 - part) * weights[k] + part * weights[k + 1]).ravel()
-        combined: list[float] = (share @ self._gains).tolist()
-        return combined
+        v, along = _between(self._velocities, velocity)
+        x, across = _between(self._positions, position) if self._positions else (0, 0.0)
+        low, high = self._gains[v], self._gains[v + 1]
+        here = [a + along * (b - a) for a, b in zip(low[x], high[x], strict=True)]
+        if across == 0.0:
+            return here
+        other = [a + along * (b - a) for a, b in zip(low[x + 1], high[x + 1], strict=True)]
+        return [a + across * (b - a) for a, b in zip(here, other, strict=True)]
 
-    def step(
-        self, wanted: Setpoint, measured: float, duration: float, force: float = 0.0, feedforward: float = 0.0
-    ) -> float:  # fmt: skip
+    def step(self, wanted: Setpoint, measured: float, duration: float, force: float = 0.0, feedforward: float = 0.0) -> float:
         """Output for one sample that comes ``duration`` [s] after the last.
 
         Args:
