@@ -16,7 +16,12 @@ from fric.control.controller import Setpoint
 from fric.control.controller_file import ControllerError, read_controller
 from fric.control.tensor_product.certificate import certify, is_positive_definite
 from fric.control.tensor_product.design import Requirements, TensorProductController, design
-from fric.control.tensor_product.design_file import controller_from_text, controller_to_text, read_tp_controller
+from fric.control.tensor_product.design_file import (
+    controller_from_text,
+    controller_to_text,
+    read_tp_controller,
+    write_tp_controller,
+)
 from fric.control.tensor_product.law import TensorProductLaw
 from fric.control.tensor_product.polytope import Polytope, polytope
 from fric.control.tensor_product.quasi_lpv import TensorProductControlError, mass_on_friction, pneumatic_cylinder
@@ -175,7 +180,7 @@ def test_a_second_solver_agrees() -> None:
 def test_a_file_is_proved_again(tmp_path: Path) -> None:
     made = designed()
     path = tmp_path / "tp.yaml"
-    made.save(path)
+    write_tp_controller(made, path)
     back = read_tp_controller(path)
     for one, other in ((made.gains, back.gains), (made.p, back.p), (made.a, back.a), (made.b, back.b)):
         np.testing.assert_array_equal(one, other)
@@ -215,7 +220,7 @@ def test_the_output_is_bounded_and_bad_inputs_change_nothing() -> None:
 
 
 def test_a_controller_file_names_a_design(tmp_path: Path) -> None:
-    designed().save(tmp_path / "tp.yaml")
+    write_tp_controller(designed(), tmp_path / "tp.yaml")
     head = "format: fric-controller/1\nunits: {position: m, force: N}\nperiod: 0.001\nresolution: 1.0e-6\n"
     file = tmp_path / "controller.yaml"
     file.write_text(head + "controller: {type: tensor_product, design: tp.yaml, filter_time: 0.002, tolerance: 2.0e-5}\n")
@@ -233,7 +238,7 @@ def test_a_controller_file_names_a_design(tmp_path: Path) -> None:
     file.write_text(head.replace("N}", "A}") + "controller: {type: tensor_product, design: tp.yaml}\n")
     with pytest.raises(ControllerError, match="units are m and N"):
         read_controller(file)
-    trial.cylinder_design().save(tmp_path / "tp.yaml")
+    write_tp_controller(trial.cylinder_design(), tmp_path / "tp.yaml")
     file.write_text(head + "controller: {type: tensor_product, design: tp.yaml}\n")
     with pytest.raises(TensorProductControlError, match="force of the actuator"):
         read_controller(file)

@@ -29,13 +29,14 @@ from ...control.tensor_product.design_file import controller_from_text, controll
 from ...control.tensor_product.law import TensorProductLaw
 from ...control.tensor_product.polytope import Polytope, polytope
 from ...control.tensor_product.quasi_lpv import QuasiLpvPlant, TensorProductControlError, mass_on_friction, pneumatic_cylinder
+from ...figure import Figure
 from ...friction.tensor_product import from_law, from_model, velocity_grid
 from ...model import Model, term
 from ...model_file import read_model
 from ...record import Array
 from ...shared_files import config_file
 from ...simulation import Simulator
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 
 __all__ = ["BENCHMARK", "cylinder_design", "decay_found", "design_time", "positioned", "random_design", "random_plant"]
 
@@ -173,13 +174,12 @@ def design_time() -> float:
 
 def run(starts: Sequence[int] = range(N_STARTS), designs: Sequence[int] = range(N_DESIGNS)) -> list[Figure]:
     """Hunting over starts and loads; eigenvalues and decay over random designs; time."""
-    found = {}
-    for name, made, seeds in (
-        ("tensor product", tensor_product, starts),
-        ("PID", pid, starts),
-        ("PID whose integral rests", lambda: pid(TOLERANCE), starts[: max(len(starts) // 10, 1)]),
-    ):
-        found[name] = np.array([positioned(made(), seed) for seed in seeds])
+    few = starts[: max(len(starts) // 10, 1)]
+    found = {
+        "tensor product": np.array([positioned(tensor_product(), seed) for seed in starts]),
+        "PID": np.array([positioned(pid(), seed) for seed in starts]),
+        "PID whose integral rests": np.array([positioned(pid(TOLERANCE), seed) for seed in few]),
+    }
     figures = []
     for name, each in found.items():
         share = float(np.mean(each[:, 0] > 0.0))

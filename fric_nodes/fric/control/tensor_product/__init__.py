@@ -9,7 +9,7 @@ needs the extra ``control`` (cvxpy), the rest doesn't::
     plant = mass_on_friction(friction, slowest=2e-3, fastest=0.5, error=0.01)
     controller = design(polytope(plant), Requirements(decay=8.0, limit=60.0))
     print(controller.summary())
-    controller.save("tp.yaml")
+    write_tp_controller(controller, "tp.yaml")
 
 and in a ``fric-controller/1`` file: ``controller: {type: tensor_product, design: tp.yaml, tolerance: 2.0e-5}``.
 """

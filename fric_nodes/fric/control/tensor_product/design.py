@@ -14,7 +14,6 @@ body that sticks is outside of what is proved, and a simulation has to show what
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,12 +103,6 @@ class TensorProductController:
         """Of the closed loop at each vertex with its own gain, ``(r, n_variants, n)`` [1/s]."""
         closed = self.a + np.einsum("rha,rb->rhab", self.b, self.gains)
         return np.asarray(np.linalg.eigvals(closed))
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write it as ``fric-tp-controller/1``; :func:`.design_file.read_tp_controller` reads it."""
-        from .design_file import write_tp_controller
-
-        write_tp_controller(self, path)
 
     def summary(self) -> str:
         """The design in a few lines."""
