@@ -1,4 +1,4 @@
-"""Proof of a design in exact arithmetic: what a solver says in floating point isn't believed.
+"""Proof of a design in exact arithmetic, whatever the accuracy of the solver that found it.
 
 With P and the gains as they are used, and Q_ij = P (A_i + B_i K_j) + (A_i + B_i K_j)' P + 2 alpha P, it is shown that
 

@@ -1,7 +1,7 @@
 """The vertices of a quasi-LPV plant, and the weights that its gains are interpolated by.
 
 S(p) = [A(p) B(p)] is sampled over the parameters' grids and decomposed as in
-:mod:`fric.friction.tensor_product_transformation`. What comes out is checked, not believed: weights not below zero that sum
+:mod:`fric.friction.tensor_product_transformation`. What comes out is checked: weights not below zero that sum
 to one, and the samples given back.
 """
 
