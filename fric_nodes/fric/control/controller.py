@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from ..parameter import Parameter
@@ -68,6 +69,8 @@ class Controller:
         parameters: its gains.
         build: the law with values of all parameters by name, and the largest output [F].
         source: where it comes from.
+        designed: of a kind whose gains come from a design file, the kind that holds the one at a path; None: it has none.
+        units: of position and force that a design holds for, as text; None: any.
     """
 
     id: str
@@ -75,6 +78,8 @@ class Controller:
     parameters: tuple[Parameter, ...]
     build: Callable[[Mapping[str, float], float], Law] = field(repr=False)
     source: str = ""
+    designed: Callable[[Path], Controller] | None = field(default=None, repr=False)
+    units: tuple[str, str] | None = None
 
     def refusal(self, values: Mapping[str, float]) -> str | None:
         """What is wrong with ``values``, or None when they can be used."""

@@ -9,7 +9,8 @@
     controller: {type: pid, proportional: 1.0e+5, integral: 1.0e+6, derivative: 400.0, filter_time: 5.0e-4}
     feedforward: {model: model.yaml}    # relative to this file; terms: [coulomb, viscous] takes these only
 
-The types are those of :data:`fric.control.feedbacks.CONTROLLERS`, each with the parameters that it declares.
+The types are those of :data:`fric.control.feedbacks.CONTROLLERS`, each with the parameters that it declares, and those whose
+gains come from a design file with ``design``, its path relative to this file.
 """
 
 from __future__ import annotations
@@ -68,6 +69,8 @@ def _entries() -> dict[str, type[BaseModel]]:
     for kind in CONTROLLERS.values():
         fields: dict[str, Any] = {"type": (Literal[kind.id], ...)}
         fields |= {parameter.name: field_of(parameter) for parameter in kind.parameters}
+        if kind.designed is not None:
+            fields["design"] = (str, Field(min_length=1, description="path of the design file, relative to this one"))
         entries[kind.id] = create_model(f"controller_{kind.id}", __config__=STRICT, __doc__=kind.title, **fields)
     return entries
 
@@ -114,8 +117,13 @@ def read_controller(path: str | os.PathLike[str]) -> ControllerSettings:
             f"{source}, line {line_of(tree, ('controller', 'type'))}", problem, f"use one of {', '.join(CONTROLLERS)}"
         )
     given = validated(_entries()[kind.id], entry.controller, tree, source, ControllerError, ("controller",))
-    gains: dict[str, float] = given.model_dump(exclude={"type"})
+    gains: dict[str, float] = given.model_dump(exclude={"type", "design"})
     units = Units(entry.units.position, entry.units.force)
+    if kind.designed is not None:
+        design = Path(source).parent / str(entry.controller["design"])
+        kind = kind.designed(design)
+        if kind.units is not None:
+            _same_units(Units(*kind.units), units, str(design), source)
     limit = math.inf if entry.force_limit is None else entry.force_limit
     model = None
     if entry.feedforward is not None:
