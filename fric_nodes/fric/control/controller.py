@@ -6,13 +6,20 @@ A controller is one file in ``control/feedbacks/`` with a constant ``CONTROLLER`
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
+from ..errors import InputError
+from ..model import Model
 from ..parameter import Parameter
 
-__all__ = ["Controller", "Law", "Setpoint"]
+__all__ = ["ControlInputError", "Controller", "Law", "Setpoint", "check_inputs"]
+
+
+class ControlInputError(InputError):
+    """A sample that a control law can't answer."""
 
 
 class Setpoint(NamedTuple):
@@ -21,6 +28,19 @@ class Setpoint(NamedTuple):
     position: float
     velocity: float = 0.0
     acceleration: float = 0.0
+
+
+def check_inputs(wanted: Setpoint, measured: float, duration: float, feedforward: float) -> None:
+    """Refuse what isn't finite; arguments as of :meth:`Law.answer`.
+
+    Raises:
+        ControlInputError: an input isn't finite, or the duration isn't positive.
+    """
+    if not math.isfinite(wanted.position + wanted.velocity + wanted.acceleration + measured + feedforward):
+        given = f"wanted {tuple(wanted)}, measured {measured}, feedforward {feedforward}"
+        raise ControlInputError("controller", f"an input is not finite ({given})", "leave the sample out")
+    if not 0.0 < duration < math.inf:
+        raise ControlInputError("controller", f"duration is {duration}", "give the time since the last sample, greater than 0")
 
 
 class Law(Protocol):
@@ -65,6 +85,7 @@ class Controller:
         parameters: its gains.
         build: the law with values of all parameters by name, and the largest output [F].
         source: where it comes from.
+        from_model: parameters that an identified model gives, by name; None: there are none.
     """
 
     id: str
@@ -72,6 +93,7 @@ class Controller:
     parameters: tuple[Parameter, ...]
     build: Callable[[Mapping[str, float], float], Law] = field(repr=False)
     source: str = ""
+    from_model: Callable[[Model], dict[str, float]] | None = field(default=None, repr=False)
 
     def refusal(self, values: Mapping[str, float]) -> str | None:
         """What is wrong with ``values``, or None when they can be used."""
