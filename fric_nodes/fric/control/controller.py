@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 from ..errors import InputError
 from ..model import Model
 from ..parameter import Parameter
+from .tunable import Tunable
 
 __all__ = ["ControlInputError", "Controller", "Law", "Setpoint", "check_inputs"]
 
@@ -86,6 +87,7 @@ class Controller:
         build: the law with values of all parameters by name, and the largest output [F].
         source: where it comes from.
         from_model: parameters that an identified model gives, by name; None: there are none.
+        tunable: how its gains are made from an identified model; None: they are given by hand.
     """
 
     id: str
@@ -94,6 +96,7 @@ class Controller:
     build: Callable[[Mapping[str, float], float], Law] = field(repr=False)
     source: str = ""
     from_model: Callable[[Model], dict[str, float]] | None = field(default=None, repr=False)
+    tunable: Tunable | None = field(default=None, repr=False)
 
     def refusal(self, values: Mapping[str, float]) -> str | None:
         """What is wrong with ``values``, or None when they can be used."""

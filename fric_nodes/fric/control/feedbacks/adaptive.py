@@ -23,6 +23,7 @@ Wit, Astrom, Braun 1987 (adaptive friction compensation).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +34,8 @@ from ...model import Model
 from ...parameter import Parameter
 from ...record import Array
 from ..controller import Controller, Setpoint, check_inputs
+from ..loop import Polynomials, pid_polynomials
+from ..tunable import Basis, Tunable
 from .disturbance_observer import Filtered
 from .pid import Pid, PidGains
 
@@ -231,6 +234,21 @@ def _start_of(model: Model) -> dict[str, float]:
     }
 
 
+def _gains(basis: Basis) -> dict[str, float]:
+    time = 1.0 / basis.crossover
+    start = _start_of(basis.model)
+    # Slow is what the filter can't tell from standing: two steps of the encoder in its time, or a tenth of what the loop's
+    # bandwidth makes of the error at which the proportional part overcomes friction.
+    slow = max(2.0 * basis.resolution / time, 0.1 * basis.crossover * basis.coulomb / max(basis.pid["proportional"], 1e-300))
+    integral = basis.pid["integral"] * 0.25**basis.calm
+    own = {"inertia_share": 1.0, "observer_time": time, "memory": 2.0, "slow": slow, "noise": 0.02 * basis.coulomb}
+    return {**basis.pid, **start, **own, "integral": integral, "smoothing": 0.1}
+
+
+def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
+    return [pid_polynomials(*(values[name] for name in _GAINS), period)]
+
+
 CONTROLLER = Controller(
     id="adaptive",
     title="PID controller with friction identified in the loop",
@@ -255,4 +273,5 @@ CONTROLLER = Controller(
     build=lambda values, limit: _build(dict(values), limit),
     source="Astrom and Wittenmark 1995, sections 2.2 and 11.5; Canudas de Wit, Astrom, Braun 1987",
     from_model=_start_of,
+    tunable=Tunable(_gains, _linear),
 )

@@ -20,10 +20,15 @@ the reference at rest, which stops that. Source: Ohnishi 1987; Umeno, Kaneko, Ho
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+
+import numpy as np
 
 from ...model import Model
 from ...parameter import Parameter
 from ..controller import Controller, Setpoint, check_inputs
+from ..loop import Polynomials, added, pid_polynomials
+from ..tunable import Basis, Tunable
 from .pid import Pid, PidGains
 
 __all__ = ["CONTROLLER", "DisturbanceObserver", "Filtered", "nominal_of"]
@@ -153,6 +158,29 @@ def _build(values: dict[str, float], limit: float) -> DisturbanceObserver:
     return DisturbanceObserver(gains, values["inertia"], values["damping"], values["observer_time"], values["dead_zone"], limit)
 
 
+def _gains(basis: Basis) -> dict[str, float]:
+    nominal = nominal_of(basis.model)
+    base = {**basis.pid, "integral": 0.0, **nominal, "dead_zone": basis.dead_zone if basis.calm > 0 else 0.0}
+    slowest = 30.0 / basis.crossover
+    bandwidth = basis.largest(lambda value: {**base, "observer_time": 1.0 / value}, 1.0 / slowest, 10.0 * basis.crossover)
+    return {**base, "observer_time": 1.0 / bandwidth}
+
+
+def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
+    """U (1 - Q/z) = (C + J s^2 Q + B s Q) e, of which everything is as :class:`Filtered` computes it."""
+    time = values["observer_time"]
+    inner = pid_polynomials(values["proportional"], values["integral"], values["derivative"], values["filter_time"], period)
+    lag = np.array([time + period, -time])
+    difference, low = np.array([1.0, -1.0]), np.array([period, 0.0])
+    square = np.polymul(lag, lag)
+    observed = values["inertia"] * np.polymul(difference, difference)
+    observed = np.polyadd(observed, values["damping"] * np.polymul(difference, low))
+    top, bottom = added([inner, (np.asarray(observed), np.asarray(square))])
+    # 1/(1 - Q/z) = z lag^2/(z lag^2 - low^2), of which low^2 = h^2 z^2.
+    filtered = np.polymul([1.0, 0.0], square)
+    return [(np.asarray(np.polymul(top, filtered)), np.asarray(np.polymul(bottom, np.polysub(filtered, np.polymul(low, low)))))]
+
+
 CONTROLLER = Controller(
     id="disturbance_observer",
     title="PID controller with a disturbance observer",
@@ -169,4 +197,5 @@ CONTROLLER = Controller(
     build=lambda values, limit: _build(dict(values), limit),
     source="Ohnishi 1987; Umeno, Kaneko, Hori 1993",
     from_model=nominal_of,
+    tunable=Tunable(_gains, _linear),
 )

@@ -17,11 +17,14 @@ bias]``). Source: Canudas de Wit, Olsson, Astrom, Lischinsky 1995, section V (ob
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...model import Model, ModelError
 from ...parameter import Parameter
 from ..controller import Controller, Setpoint, check_inputs
+from ..loop import Polynomials, pid_polynomials
+from ..tunable import Basis, Tunable
 from .pid import Pid, PidGains
 
 __all__ = ["CONTROLLER", "Bristles", "FrictionObserver", "bristles_of"]
@@ -169,6 +172,32 @@ def _build(given: dict[str, float], limit: float) -> FrictionObserver:
     )
 
 
+_PID = ("proportional", "integral", "derivative", "filter_time")
+
+
+def _gains(basis: Basis) -> dict[str, float]:
+    held = {parameter.name: parameter.value for parameter in basis.model.parameters()}
+    if basis.stuck > 0.0:
+        bristles = bristles_of(basis.model)
+    else:
+        # Rigid friction: bristles that give way by twice the encoder's step, or by what the loop can't resolve.
+        way = max(2.0 * basis.resolution, 0.01 * basis.coulomb / basis.pid["proportional"])
+        bristles = {
+            "coulomb": basis.coulomb,
+            "static": basis.coulomb + max(held.get("stribeck.force", 0.0), 0.0),
+            "stribeck": held.get("stribeck.velocity", 1.0),
+            "stiffness": basis.coulomb / way,
+            "bristle_damping": 0.0,
+        }
+    integral = basis.pid["integral"] * 0.25**basis.calm
+    rest = {"injection": 0.0, "scale": 1.0, "reference_share": 1.0, "velocity_filter": 0.0}
+    return {**basis.pid, "integral": integral, **bristles, **rest}
+
+
+def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
+    return [pid_polynomials(*(values[name] for name in _PID), period)]
+
+
 CONTROLLER = Controller(
     id="friction_observer",
     title="PID controller with an observer of the LuGre state",
@@ -190,4 +219,5 @@ CONTROLLER = Controller(
     build=lambda values, limit: _build(dict(values), limit),
     source="Canudas de Wit, Olsson, Astrom, Lischinsky 1995, section V",
     from_model=bristles_of,
+    tunable=Tunable(_gains, _linear),
 )

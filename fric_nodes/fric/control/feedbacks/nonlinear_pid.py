@@ -22,10 +22,13 @@ print; the form here is that of gains scheduled by error and speed, Armstrong-He
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...parameter import Parameter
 from ..controller import Controller, Setpoint, check_inputs
+from ..loop import Polynomials, pid_polynomials
+from ..tunable import Basis, Tunable
 
 __all__ = ["CONTROLLER", "NonlinearPid", "NonlinearPidGains"]
 
@@ -117,6 +120,23 @@ class NonlinearPid:
         return output
 
 
+def _gains(basis: Basis) -> dict[str, float]:
+    error = max(basis.coulomb / max(basis.pid["proportional"], 1e-300), 4.0 * basis.resolution)
+    scales = {"error_scale": error, "speed_scale": error * basis.crossover}
+    # The linear loop with the largest factor has to be stable with margins as well: some of the integral action is kept back.
+    base = {**basis.pid, "integral": 0.5 * basis.pid["integral"], "proportional_factor": 1.0, **scales}
+    if basis.calm > 0:
+        base["integral"] *= 0.25**basis.calm
+    factor = basis.largest(lambda value: {**base, "integral_factor": value}, 1.0, 30.0)
+    return {**base, "integral_factor": factor}
+
+
+def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
+    kp, ki, kd, filter_time = (values[name] for name in ("proportional", "integral", "derivative", "filter_time"))
+    near = kp * values["proportional_factor"], ki * values["integral_factor"]
+    return [pid_polynomials(kp, ki, kd, filter_time, period), pid_polynomials(*near, kd, filter_time, period)]
+
+
 CONTROLLER = Controller(
     id="nonlinear_pid",
     title="PID controller with gains scheduled by error and speed",
@@ -132,4 +152,5 @@ CONTROLLER = Controller(
     ),
     build=lambda values, limit: NonlinearPid(NonlinearPidGains(**values), limit),
     source="Amthor et al. 2008, Fig. 7; Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 5.2",
+    tunable=Tunable(_gains, _linear),
 )

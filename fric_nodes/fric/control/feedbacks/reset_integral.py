@@ -16,9 +16,12 @@ Source: Clegg 1958; Beerens, Bisoffi, Zaccarian, Heemels, Nijmeijer, van de Wouw
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from ...parameter import Parameter
 from ..controller import Controller, Setpoint, check_inputs
+from ..loop import Polynomials, pid_polynomials
+from ..tunable import Basis, Tunable
 from .pid import PidGains
 
 __all__ = ["CONTROLLER", "ResetIntegral"]
@@ -97,6 +100,17 @@ def _build(given: dict[str, float], limit: float) -> ResetIntegral:
     return ResetIntegral(gains, given["reset_factor"], given["dead_zone"], given["slow"], limit)
 
 
+_PID = ("proportional", "integral", "derivative", "filter_time")
+
+
+def _gains(basis: Basis) -> dict[str, float]:
+    return {**basis.pid, "reset_factor": 0.0, "dead_zone": basis.dead_zone, "slow": 0.0}
+
+
+def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
+    return [pid_polynomials(*(values[name] for name in _PID), period)]
+
+
 CONTROLLER = Controller(
     id="reset_integral",
     title="PID controller whose integral is reset when the error passes zero",
@@ -111,4 +125,5 @@ CONTROLLER = Controller(
     ),
     build=lambda values, limit: _build(dict(values), limit),
     source="Clegg 1958; Beerens et al. 2019, Automatica 107",
+    tunable=Tunable(_gains, _linear),
 )
