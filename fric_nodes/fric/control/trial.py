@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -107,17 +108,29 @@ def sine(period: float, amplitude: float, frequency: float, duration: float, fad
     )
 
 
-def point_to_point(period: float, points: list[float], move: float, rest: float) -> Reference:
-    """From the first point to each other by moves of least jerk that last ``move`` [s], with rests of ``rest`` [s] between."""
-    n_move, n_rest = round(move / period), round(rest / period)
-    s = np.arange(1, n_move + 1) / n_move
-    shape = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s**2 * (1.0 - s) ** 2, 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+def point_to_point(
+    period: float, points: Sequence[float], move: float, rest: float = 0.0, speed: float = math.inf
+) -> Reference:
+    """From point to point by moves of least jerk.
+
+    Args:
+        period: [s].
+        points: where it begins and goes [x].
+        move: least duration of a move [s].
+        rest: after each move [s].
+        speed: largest, for which a move takes longer [x/s].
+    """
+    n_rest = round(rest / period)
     parts: list[Array] = [np.array([[points[0]], [0.0], [0.0]])]
     for a, b in pairwise(points):
-        parts.append(np.array([a + (b - a) * shape[0], (b - a) * shape[1] / move, (b - a) * shape[2] / move**2]))
+        n = round(max(move, 1.875 * abs(b - a) / speed) / period)  # 1.875: peak over mean speed of least jerk
+        s, took = np.arange(1, n + 1) / n, n * period
+        position = a + (b - a) * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+        velocity = (b - a) / took * 30.0 * s**2 * (1.0 - s) ** 2
+        parts.append(np.array([position, velocity, (b - a) / took**2 * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)]))
         parts.append(np.array([np.full(n_rest, b), np.zeros(n_rest), np.zeros(n_rest)]))
-    position, velocity, acceleration = np.concatenate(parts, axis=1)
-    return Reference(period, position, velocity, acceleration)
+    whole = np.concatenate(parts, axis=1)
+    return Reference(period, whole[0], whole[1], whole[2])
 
 
 def follow(body: Body, law: Law, reference: Reference, forward: Force | None = None, delay: int = 0) -> Course:
