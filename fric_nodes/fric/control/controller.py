@@ -49,8 +49,10 @@ class Law(Protocol):
 
     limit: float
     """Largest output [F]."""
-    saturated: int
-    """Number of samples at which the limit took something away."""
+
+    @property
+    def saturated(self) -> int:
+        """Number of samples at which the limit took something away."""
 
     def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
         """Start in motion, as if it had been controlling before.

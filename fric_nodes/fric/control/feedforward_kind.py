@@ -26,8 +26,9 @@ class FeedforwardKindError(InputError):
 class Force(Protocol):
     """A feedforward at work, with its state."""
 
-    friction: float
-    """Share of the last force that changes its sign with the direction of motion [F]."""
+    @property
+    def friction(self) -> float:
+        """Share of the last force that changes its sign with the direction of motion [F]."""
 
     def reset(self) -> None:
         """Start anew, at rest."""
@@ -114,7 +115,8 @@ class FeedforwardKind:
         unknown = sorted(set(given) - set(known))
         if unknown:
             raise FeedforwardKindError(where, f"unknown setting '{unknown[0]}'", f"use only {', '.join(known) or 'its type'}")
-        for each in (*self.parameters, *self.texts):
+        declared: list[Parameter | Text] = [*self.parameters, *self.texts]
+        for each in declared:
             if each.name not in given and each.default is None:
                 raise FeedforwardKindError(where, f"'{each.name}' is missing", f"give {each.doc}")
         values: dict[str, float] = {}

@@ -139,10 +139,6 @@ class Total:
         """Share of the last force that changes its sign with the direction [F]."""
         return sum(part.friction for part in self.parts)
 
-    @friction.setter
-    def friction(self, value: float) -> None:
-        raise AttributeError("the share belongs to the parts")
-
     def reset(self) -> None:
         """Start all of them anew."""
         for part in self.parts:

@@ -63,6 +63,7 @@ class BenchAxis:
         excitation: motion of the recording.
         task: motion on which methods are compared.
         springs: of the DNLRX; 0: none is identified.
+        quick: motion of a second recording, from which the rigid model is identified; None: from the first.
     """
 
     id: str
@@ -75,6 +76,7 @@ class BenchAxis:
     position_noise: float = 0.0
     force_noise: float = 0.0
     springs: int = 10
+    quick: Callable[[float], Reference] | None = field(default=None, repr=False)
 
     @cached_property
     def reference(self) -> Reference:
@@ -110,27 +112,31 @@ class BenchAxis:
             seed=seed,
         )
 
-    def recorded(self, truth: Model, seed: int) -> Record:
-        """The axis along its excitation, under a loop as slow as a guess of the mass allows."""
+    def recorded(self, truth: Model, seed: int) -> tuple[Record, Record]:
+        """The axis along its excitations, under a loop as slow as a guess of the mass allows; for pre-sliding, and the rest."""
+        graded = self._along(self.excitation, truth, seed)
+        return graded, graded if self.quick is None else self._along(self.quick, truth, seed + 1)
+
+    def _along(self, excitation: Callable[[float], Reference], truth: Model, seed: int) -> Record:
         mass, period = self.nominal.total_inertia, self.timing.period
         w = 0.08 / (period + self.timing.delay)  # numerical: a crossover that leaves more than 60 degrees
         slow = Pid(PidGains(mass * w * w, 0.3 * mass * w**3, 1.5 * mass * w, period), self.timing.force_limit)
-        course = follow(self.body(truth, seed), slow, self.excitation(period), delay=self.delay)
-        return record_of(course)
+        course = follow(self.body(truth, seed), slow, excitation(period), delay=self.delay)
+        return replace(record_of(course), units=self.nominal.units, joint=self.nominal.joint)
 
-    def identified(self, record: Record) -> Known:
-        """What ``record`` tells.
+    def identified(self, graded: Record, quick: Record) -> Known:
+        """What the recordings tell.
 
         Raises:
             IdentificationError: not even the rigid model can be identified.
         """
         units, joint = self.nominal.units, self.nominal.joint
-        record = replace(record, units=units, joint=joint)
-        rigid = METHODS["inverse-dynamics"].fit(start_model(["coulomb", "viscous", "bias"], joint, units), [record], Options())
+        start = start_model(["coulomb", "viscous", "bias"], joint, units)
+        rigid = METHODS["inverse-dynamics"].fit(start, [quick], Options()).model
         found = None
         if self.springs:
             ones = {f"{name}_{k}": 1.0 for k in range(1, self.springs + 1) for name in ("stiffness", "limit")}
-            start = build_model(
+            springs = build_model(
                 "rigid",
                 {"mass": 1.0},
                 [term("viscous", coefficient=0.0), term("bias", force=0.0), term("presliding", "maxwell_slip", **ones)],
@@ -138,11 +144,16 @@ class BenchAxis:
                 units=units,
             )
             try:
-                found = METHODS["two-stage"].fit(start, [record], Options())
+                found = METHODS["two-stage"].fit(springs, [graded], Options())
             except IdentificationError:
                 found = None
         dnlrx = found.dnlrx.model if isinstance(found, TwoStageIdentification) and found.dnlrx is not None else None
-        return Known(record, rigid.model, None if found is None else found.model, dnlrx)
+        presliding = None if found is None else found.model
+        if presliding is not None and self.quick is not None:
+            # Slow strokes leave the mass to chance.
+            presliding = presliding.with_value("mass", rigid.value("mass"))
+            presliding = presliding.with_value("viscous.coefficient", rigid.value("viscous.coefficient"))
+        return Known(graded, rigid, presliding, dnlrx)
 
 
 def record_of(course: Course) -> Record:
@@ -164,6 +175,12 @@ def _graded(largest: float, smallest: float, grades: int, speed: float, move: fl
     for a in np.geomspace(largest, smallest, grades).tolist():
         points += [a, -a, -0.4 * a, -0.8 * a, 0.5 * a, 0.1 * a, a, -a]
     return lambda period: point_to_point(period, [*points, 0.0], move, 0.0, speed)
+
+
+def _quick(amplitude: float, move: float) -> Callable[[float], Reference]:
+    """Thirty moves to and fro, so quick that inertia shows beside friction."""
+    points = [0.0, *(amplitude * (1.0 - 0.02 * k) * (-1.0) ** k for k in range(30)), 0.0]
+    return lambda period: point_to_point(period, points, move, 0.25 * move)
 
 
 _SLIDE = build_model(
@@ -220,6 +237,7 @@ AXES: dict[str, BenchAxis] = {
             readings=4,
             position_noise=1e-10,
             force_noise=2e-4,
+            quick=_quick(5e-4, 0.03),
         ),
         BenchAxis(
             "two_mass",

@@ -121,7 +121,7 @@ def compete(
             axis = AXES[axis_id]
             told(f"seed {seed}, {axis.title}: recording and identification")
             truth = axis.drawn(seed)
-            known = axis.identified(axis.recorded(truth, seed))
+            known = axis.identified(*axis.recorded(truth, seed))
             at_work = axis.drawn(seed + 500_000, _AGED, truth) if aged else truth
             bench = Bench(axis, at_work, seed, known)
             for name in chosen:

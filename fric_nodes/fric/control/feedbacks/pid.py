@@ -167,7 +167,8 @@ def _gains(basis: Basis) -> dict[str, float]:
 
 
 def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
-    return [pid_polynomials(*(values[name] for name in _PID), period)]
+    kp, ki, kd, filter_time = (values[name] for name in _PID)
+    return [pid_polynomials(kp, ki, kd, filter_time, period)]
 
 
 CONTROLLER = Controller(

@@ -40,7 +40,8 @@ class StaticTable:
             raise FeedforwardKindError("static table", "is not made of pairs of finite numbers", "give velocity and force each")
         if np.any(np.diff(v) <= 0.0):
             raise FeedforwardKindError("static table", "velocities don't increase", "sort the pairs, without repetition")
-        self._v, self._f = v.tolist(), f.tolist()
+        self._v: list[float] = v.tolist()
+        self._f: list[float] = f.tolist()
         self._signed = bool(v[0] < 0.0)
         self._mass, self._preview = mass, preview
         self.friction = 0.0
