@@ -111,11 +111,11 @@ class FeedforwardKind:
             FeedforwardKindError: something is unknown, missing or out of bounds.
         """
         where = f"feedforward '{self.id}'"
-        known = [each.name for each in (*self.parameters, *self.texts)]
+        declared: list[Parameter | Text] = [*self.parameters, *self.texts]
+        known = [each.name for each in declared]
         unknown = sorted(set(given) - set(known))
         if unknown:
             raise FeedforwardKindError(where, f"unknown setting '{unknown[0]}'", f"use only {', '.join(known) or 'its type'}")
-        declared: list[Parameter | Text] = [*self.parameters, *self.texts]
         for each in declared:
             if each.name not in given and each.default is None:
                 raise FeedforwardKindError(where, f"'{each.name}' is missing", f"give {each.doc}")

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,7 +110,8 @@ def response(of: Polynomials, z: NDArray[np.complex128]) -> NDArray[np.complex12
 
 def added(parts: Sequence[Polynomials]) -> Polynomials:
     """Sum of ratios; denominators that are the same array are taken once."""
-    numerator, denominator = parts[0]
+    numerator: Any = parts[0][0]
+    denominator: Any = parts[0][1]
     for n, d in parts[1:]:
         if d.shape == denominator.shape and np.array_equal(d, denominator):
             numerator = np.polyadd(numerator, n)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -75,7 +76,7 @@ def _run_all() -> Evidence:
     reference = sine(SAMPLE_TIME, _AMPLITUDE, _FREQUENCY, 4.0)
     figures: list[Figure] = []
     courses: dict[str, Course] = {}
-    laws = {
+    laws: dict[str, Callable[[], Law]] = {
         "soft PID": lambda: Pid(_SOFT, _LIMIT),
         "tightest PID": lambda: Pid(_TIGHT, _LIMIT),
         "nonlinear PID": lambda: _nonlinear(best),

@@ -111,10 +111,10 @@ def compete(
         InputError: an axis or method is unknown.
     """
     chosen_axes, chosen = list(axes) or list(AXES), list(methods) or list(METHODS)
-    for names, known, what in ((chosen_axes, AXES, "axis"), (chosen, METHODS, "method")):
+    for names, choices, what in ((chosen_axes, list(AXES), "axis"), (chosen, list(METHODS), "method")):
         for name in names:
-            if name not in known:
-                raise InputError("comparison", f"no {what} '{name}'", f"choose from {', '.join(known)}")
+            if name not in choices:
+                raise InputError("comparison", f"no {what} '{name}'", f"choose from {', '.join(choices)}")
     found: dict[tuple[str, str], list[Outcome]] = {}
     for seed in seeds:
         for axis_id in chosen_axes:

@@ -98,8 +98,8 @@ class Bench:
         coulomb = self.known.rigid.value("coulomb.force")
         if model is not None:
             stiffness = sum(p.value for p in model.parameters() if p.name.startswith("presliding.stiffness"))
-            return 3.0 * coulomb / stiffness
-        return coulomb / max(self.tuned("pid").gains["proportional"], 1e-300)
+            return float(3.0 * coulomb / stiffness)
+        return float(coulomb / max(self.tuned("pid").gains["proportional"], 1e-300))
 
 
 Method = Callable[[Bench], Course]
@@ -145,7 +145,7 @@ def _pulse(bench: Bench) -> Course:
 def _main_frequency(velocity: Array, period: float) -> float:
     """Reversals per second, by two [Hz]."""
     turns = np.count_nonzero(velocity[1:] * velocity[:-1] < 0.0)
-    return max(0.5 * turns / (velocity.shape[0] * period), 1e-9)
+    return max(0.5 * float(turns) / (velocity.shape[0] * period), 1e-9)
 
 
 def _learning(bench: Bench) -> Course:

@@ -174,7 +174,7 @@ def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
     lag = np.array([time + period, -time])
     difference, low = np.array([1.0, -1.0]), np.array([period, 0.0])
     square = np.polymul(lag, lag)
-    observed: Array = values["inertia"] * np.polymul(difference, difference)
+    observed: Array = np.asarray(values["inertia"] * np.polymul(difference, difference))
     observed = np.asarray(np.polyadd(observed, values["damping"] * np.polymul(difference, low)))
     top, bottom = added([inner, (np.asarray(observed), np.asarray(square))])
     # 1/(1 - Q/z) = z lag^2/(z lag^2 - low^2), of which low^2 = h^2 z^2.
