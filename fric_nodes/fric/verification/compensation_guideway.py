@@ -7,13 +7,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..bench.benchmark import Figure
 from ..control.autotune import Timing, autotune
 from ..control.controller import Law
 from ..control.feedbacks import CONTROLLERS
 from ..control.feedbacks.pid import Pid, PidGains
 from ..control.feedforwards.dnlrx import DnlrxForce
 from ..control.trial import Course, Reference, follow, sine
+from ..figure import Figure
 from ..friction.dnlrx import DnlrxModel
 from ..identification.dnlrx.fit import fit_prepared, name
 from ..identification.dnlrx.samples import prepare

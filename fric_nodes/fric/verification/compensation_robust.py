@@ -11,7 +11,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..axis import SimulatedAxis
-from ..bench.benchmark import Figure
 from ..control.autotune import Timing, autotune
 from ..control.controller import Controller, Setpoint
 from ..control.feedbacks import CONTROLLERS
@@ -19,6 +18,7 @@ from ..control.feedbacks.adaptive import Adaptive
 from ..control.feedforward import Feedforward
 from ..control.feedforward_kind import Force
 from ..control.trial import Course, follow, point_to_point, sine
+from ..figure import Figure
 from ..model import Model, build_model, term
 from .verification import Evidence, Verification
 

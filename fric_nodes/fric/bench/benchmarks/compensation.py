@@ -15,10 +15,11 @@ import numpy as np
 from ...control.feedforward import Feedforward
 from ...control.feedforwards.dnlrx import DnlrxForce
 from ...control.trial import sine
+from ...figure import Figure
 from ...friction.dnlrx import from_mechanics
 from ...model import build_model, term
 from ...record import Array
-from ..benchmark import Benchmark, Figure
+from ..benchmark import Benchmark
 from ..compensation.competition import Cell, compete, interval
 
 __all__ = ["BENCHMARK", "figures_of", "run", "step_times"]
