@@ -57,10 +57,11 @@ def test_drawn_axes_differ_within_a_fifth() -> None:
     assert np.ptp(ratio) > 0.05
 
 
-def test_a_compensator_takes_less_than_ten_microseconds() -> None:
-    assert {figure.name: figure.value for figure in step_times()}.keys()
-    # On a machine that is busy with other things the time is measured in processor time, and a factor of three is left.
-    assert all(figure.value < 30.0 for figure in step_times())
+def test_a_compensator_takes_microseconds() -> None:
+    figures = step_times()
+    assert len(figures) == 4
+    # Processor time, of a machine that may be busy with other things: a factor of three is left.
+    assert all(figure.value < 3.0 * float(figure.goal.split()[1]) for figure in figures)
 
 
 @pytest.mark.long

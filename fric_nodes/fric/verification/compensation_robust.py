@@ -17,7 +17,7 @@ from ..control.feedbacks import CONTROLLERS
 from ..control.feedbacks.adaptive import Adaptive
 from ..control.feedforward import Feedforward
 from ..control.feedforward_kind import Force
-from ..control.trial import Course, follow, point_to_point, sine
+from ..control.trial import Course, Reference, follow, point_to_point, sine
 from ..figure import Figure
 from ..model import Model, build_model, term
 from .verification import Evidence, Verification
@@ -75,6 +75,16 @@ def _over_compensated() -> list[Figure]:
     return figures
 
 
+def _to_and_fro(duration: float) -> Reference:
+    """A sine of 20 mm at 0.5 Hz that begins and ends at rest at 0."""
+    period = _TIMING.period
+    into = sine(period, 0.02, 0.5, duration, fade=1.0)
+    away = np.clip((duration - into.time) / 1.0, 0.0, 1.0)
+    position = into.position * away**3 * (10.0 - 15.0 * away + 6.0 * away * away)
+    velocity = np.gradient(position, period)
+    return Reference(period, position, velocity, np.gradient(velocity, period))
+
+
 def _rms(course: Course) -> float:
     return float(np.sqrt(np.mean(course.error**2)))
 
@@ -85,7 +95,7 @@ def _learnt(title: str, changed: Model) -> list[Figure]:
     limit, period = _TIMING.force_limit, _TIMING.period
     gains = autotune(_axis(), kind, _TIMING, draws=30).gains
     law = kind.build(gains, limit)
-    reference, short = sine(period, 0.02, 0.5, 10.0), sine(period, 0.02, 0.5, 4.0, fade=0.5)
+    reference, short = _to_and_fro(10.0), _to_and_fro(4.0)
     axis = SimulatedAxis(_axis(), resolution=_TIMING.resolution, force_limit=limit)
     delay = round(_TIMING.delay / period)
     follow(axis, law, reference, delay=delay)
@@ -107,20 +117,22 @@ def _learnt(title: str, changed: Model) -> list[Figure]:
 
 
 def _rested() -> list[Figure]:
-    """Thirty minutes of rest, sampled at 1 kHz as far as the law is concerned, with an encoder that flickers by a step."""
+    """Thirty minutes of rest at 1 kHz, of which the law gets an encoder that flickers by a step."""
     kind = CONTROLLERS["adaptive"]
     law = kind.build(autotune(_axis(), kind, _TIMING, draws=30).gains, _TIMING.force_limit)
     axis = SimulatedAxis(_axis(), resolution=_TIMING.resolution, force_limit=_TIMING.force_limit)
-    follow(axis, law, sine(_TIMING.period, 0.02, 0.5, 10.0), delay=2)
+    follow(axis, law, _to_and_fro(10.0), delay=2)
     assert isinstance(law, Adaptive)
+    # The last motion is a second ago before anything counts as rest.
+    follow(axis, law, point_to_point(_TIMING.period, [axis.position] * 2, 1.0), delay=2)
     held, learnt = law.theta.copy(), law.learnt
     random = np.random.default_rng(1)
     here = Setpoint(axis.position)
     for flicker in (random.uniform(size=1_800_000) < 0.1).tolist():
         law.answer(here, axis.position + _TIMING.resolution * flicker, _TIMING.period)
     return [
-        Figure("30 min of rest: samples learnt from after the first second", float(law.learnt - learnt), "1", "<= 1000"),
-        Figure("30 min of rest: change of the Coulomb force", float(abs(law.theta[0] - held[0]) / held[0]), "1", "<= 0.02"),
+        Figure("30 min of rest: samples learnt from", float(law.learnt - learnt), "1", "<= 0"),
+        Figure("30 min of rest: change of the Coulomb force", float(abs(law.theta[0] - held[0]) / held[0]), "1", "<= 0"),
     ]
 
 

@@ -12,8 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...control.feedbacks.friction_observer import Bristles
 from ...control.feedforward import Feedforward
 from ...control.feedforwards.dnlrx import DnlrxForce
+from ...control.many import ManyDnlrx, ManyLugre
 from ...control.trial import sine
 from ...figure import Figure
 from ...friction.dnlrx import from_mechanics
@@ -34,7 +36,8 @@ _GOALS = {
     ("slide", "pid + pre-sliding model", "pid + pulse"): ">= 5",
 }
 _REPEATS = 20_000  # numerical: steps that a time is taken over
-_MICROSECONDS = "<= 10"
+_JOINTS = 100
+_MICROSECONDS, _MILLISECOND = "<= 10", "<= 1000"
 
 
 def _ratio(cells: dict[tuple[str, str], Cell], axis: str, better: str, worse: str, name: str) -> Array:
@@ -90,6 +93,26 @@ def step_times() -> list[Figure]:
             force.step(*row)
         spent = 1e6 * (time.process_time() - start) / _REPEATS
         figures.append(Figure(f"step of the {title} compensator", spent, "us", _MICROSECONDS))
+    return [*figures, *_many(rows)]
+
+
+def _many(rows: list[list[float]]) -> list[Figure]:
+    """A hundred joints in one call, of which a thousand a second have to be made."""
+    n, springs, thresholds = _JOINTS, [1e4] * 10, (1e-6 * np.arange(1, 11)).tolist()
+    lugre = ManyLugre([Bristles(6.0, 7.0, 1e-2, 1e5, 100.0)] * n, np.full(n, 2.0), np.full(n, 20.0), 1e-3)
+    dnlrx = ManyDnlrx([from_mechanics(2.0, 20.0, 0.0, springs, thresholds, 1e-3, order=3)] * n, np.zeros(n))
+    each = np.linspace(0.5, 1.0, n)
+    motion = np.array(rows[: _REPEATS // 10])[:, :, None] * each
+    figures = []
+    for title, step in (
+        ("LuGre", lambda row: lugre.step(row[2], row[3])),
+        ("DNLRX (10,0,3)", lambda row: dnlrx.step(row[1])),
+    ):
+        start = time.process_time()
+        for row in motion:
+            step(row)
+        spent = 1e6 * (time.process_time() - start) / motion.shape[0]
+        figures.append(Figure(f"step of {n} {title} compensators in one call", spent, "us", _MILLISECOND))
     return figures
 
 
