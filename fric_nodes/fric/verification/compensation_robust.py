@@ -110,7 +110,7 @@ def _learnt(title: str, changed: Model) -> list[Figure]:
     ideal = follow(axis, fresh, short, delay=delay)
     largest = float(np.max(np.abs(meanwhile.force))) / limit
     return [
-        Figure(f"{title}: error 10 s later over that before", _rms(after) / _rms(before), "1", "<= 1.2"),
+        Figure(f"{title}: error 10 s later over that before", _rms(after) / _rms(before), "1"),
         Figure(f"{title}: the same over that of a friction known from the start", _rms(after) / _rms(ideal), "1", "<= 1.2"),
         Figure(f"{title}: largest command meanwhile, of the limit", largest, "1", "<= 1"),
     ]
@@ -144,8 +144,9 @@ def _run() -> Evidence:
     figures += _rested()
     notes = [
         "A loop is held to be at rest when its true position moves by no more than three steps of its encoder.",
-        "Error before and after a change of friction differ by the peaks at reversals, which grow with friction itself; the "
-        "second line of each compares with the same controller that knew the friction from the start.",
+        "What the compensation leaves at a reversal (here the Stribeck part, which isn't learnt) grows with friction itself: with "
+        "friction doubled the error does not come back to within 20 % of its former value. It comes back to what the same "
+        "controller has that knew the friction from the start, which is the second line of each.",
     ]
     return Evidence(figures, (), notes)
 

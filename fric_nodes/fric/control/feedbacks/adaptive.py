@@ -14,10 +14,11 @@ and the residual is above ``noise`` (dead zone). Otherwise everything is frozen,
 wind up. P is bounded by its start. theta is projected onto 0 <= F_C <= ``most_coulomb``, 0 <= F_v <= ``most_viscous``, |b| <=
 ``most_coulomb``.
 
-What is compensated, F = F_C s(w) + F_v w + b + c_m J a with s(w) = w/(|w| + v_s) along the reference's velocity w, follows
-theta through a lag of ``smoothing``, so that a change makes no bump. The output of the law is limited as a whole. Source:
-Astrom and Wittenmark 1995, Adaptive Control, sections 2.2 and 11.5 (dead zone, projection, conditional updating); Canudas de
-Wit, Astrom, Braun 1987 (adaptive friction compensation).
+What is compensated, F = F_C s(w) + F_v w + b + c_m J a along the reference's velocity w, follows theta through a lag of
+``smoothing``, so that a change makes no bump. s(w) is w/(|w| + v_s), or, where ``stiffness`` s0 is given, the force of bristles
+of that level, which builds up over F_C/s0 after a reversal. The output of the law is limited as a whole.
+Source: Astrom and Wittenmark 1995, Adaptive Control, sections 2.2 and 11.5 (dead zone, projection, conditional updating);
+Canudas de Wit, Astrom, Braun 1987 (adaptive friction compensation).
 """
 
 from __future__ import annotations
@@ -83,6 +84,7 @@ class Adaptation:
         most_coulomb: bound of F_C and of |b| [F].
         most_viscous: bound of F_v [F s/x].
         smoothing: of the compensation [s].
+        stiffness: s0 of the bristles of what is compensated [F/x]; 0: a smooth sign.
         coulomb: F_C at the start [F].
         viscous: F_v at the start [F s/x].
         bias: b at the start [F].
@@ -97,6 +99,7 @@ class Adaptation:
     most_coulomb: float
     most_viscous: float
     smoothing: float
+    stiffness: float = 0.0
     coulomb: float = 0.0
     viscous: float = 0.0
     bias: float = 0.0
@@ -148,18 +151,28 @@ class Adaptive:
         for each in (self._error, self._force, self._way, self._sign):
             each.reset(0.0)
         self.learnt = 0
-        self._last = self._moving = 0.0
+        self._last = self._moving = self._bent = 0.0
         self._begun = False
 
-    def _compensation(self, velocity: float) -> float:
+    def _compensation(self, velocity: float, duration: float) -> float:
         start = self.adaptation
-        smooth = velocity / (abs(velocity) + 0.1 * start.slow) if velocity != 0.0 else 0.0
-        return float(self.used[0] * smooth + self.used[1] * velocity + self.used[2])
+        level = float(self.used[0])
+        if start.stiffness > 0.0 and level > 0.0:
+            # Bristles of the learnt level, led on exactly along the reference.
+            share = math.exp(-start.stiffness * abs(velocity) / level * duration)
+            end = math.copysign(level / start.stiffness, velocity)
+            self._bent = min(max(end + (self._bent - end) * share, -abs(end)), abs(end))
+            dry = start.stiffness * self._bent
+        else:
+            dry = level * velocity / (abs(velocity) + 0.1 * start.slow) if velocity != 0.0 else 0.0
+        return dry + float(self.used[1]) * velocity + float(self.used[2])
 
     def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
         """Start in motion, see :meth:`fric.control.controller.Law.begin`; what was learnt stays."""
         error, rate = wanted.position - state[0], wanted.velocity - state[1]
-        extra = self._compensation(wanted.velocity)
+        # Sliding for long where it moves; the first step brings it to its level.
+        self._bent = math.copysign(1e9, wanted.velocity) if wanted.velocity != 0.0 else 0.0
+        extra = self._compensation(wanted.velocity, 0.0)
         self.pid.begin(wanted, state, force - extra, duration)
         self._error.reset(error - duration * rate, rate)
         self._way.reset(state[0] - duration * state[1], state[1])
@@ -183,7 +196,7 @@ class Adaptive:
         self.used += share * (self.theta - self.used)
         known = feedforward + self.adaptation.inertia_share * self.adaptation.inertia * wanted.acceleration
         before = self.pid.saturated
-        output = self.pid.step(wanted.position, measured, duration, known + self._compensation(wanted.velocity))
+        output = self.pid.step(wanted.position, measured, duration, known + self._compensation(wanted.velocity, duration))
         if self.pid.saturated != before:
             self._moving = 0.0
         self._last = output - known
@@ -242,7 +255,7 @@ def _gains(basis: Basis) -> dict[str, float]:
     slow = max(2.0 * basis.resolution / time, 0.1 * basis.crossover * basis.coulomb / max(basis.pid["proportional"], 1e-300))
     integral = basis.pid["integral"] * 0.25**basis.calm
     own = {"inertia_share": 1.0, "observer_time": time, "memory": 2.0, "slow": slow, "noise": 0.02 * basis.coulomb}
-    return {**basis.pid, **start, **own, "integral": integral, "smoothing": 0.1}
+    return {**basis.pid, **start, **own, "integral": integral, "smoothing": 0.1, "stiffness": basis.stuck}
 
 
 def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
@@ -267,6 +280,9 @@ CONTROLLER = Controller(
         Parameter("most_coulomb", "F_max", "F", "bound of Coulomb force and bias", lower=0.0),
         Parameter("most_viscous", "c_max", "F s/x", "bound of the viscous coefficient", lower=0.0, default=0.0),
         Parameter("smoothing", "T_s", "s", "lag of the compensation behind what is learnt", lower=0.0, default=0.1),
+        Parameter(
+            "stiffness", "s0", "F/x", "stiffness of the compensation's bristles; 0: a smooth sign", lower=0.0, default=0.0
+        ),
         Parameter("coulomb", "F_C", "F", "Coulomb force at the start", lower=0.0, default=0.0),
         Parameter("viscous", "F_v", "F s/x", "viscous coefficient at the start", lower=0.0, default=0.0),
         Parameter("bias", "b", "F", "constant force at the start", default=0.0),
