@@ -144,8 +144,8 @@ def _run() -> Evidence:
     figures += _rested()
     notes = [
         "A loop is held to be at rest when its true position moves by no more than three steps of its encoder.",
-        "What the compensation leaves at a reversal (here the Stribeck part, which isn't learnt) grows with friction itself: with "
-        "friction doubled the error does not come back to within 20 % of its former value. It comes back to what the same "
+        "What the compensation leaves at a reversal (here the Stribeck part, which isn't learnt) grows with friction itself: "
+        "with friction doubled the error does not come back to within 20 % of its former value. It comes back to what the same "
         "controller has that knew the friction from the start, which is the second line of each.",
     ]
     return Evidence(figures, (), notes)
