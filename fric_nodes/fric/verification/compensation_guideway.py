@@ -132,7 +132,7 @@ def _run_all() -> Evidence:
 
 
 VERIFICATION = Verification(
-    id="compensation_guideway",
+    id="compensation-guideway",
     title="DNLRX feedforward on a guideway in pre-sliding",
     source="Amthor et al. 2008, section 4, Figs. 8 to 11",
     run=_run_all,

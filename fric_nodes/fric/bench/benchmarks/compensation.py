@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -103,11 +103,12 @@ def _many(rows: list[list[float]]) -> list[Figure]:
     dnlrx = ManyDnlrx([from_mechanics(2.0, 20.0, 0.0, springs, thresholds, 1e-3, order=3)] * n, np.zeros(n))
     each = np.linspace(0.5, 1.0, n)
     motion = np.array(rows[: _REPEATS // 10])[:, :, None] * each
+    steps: dict[str, Callable[[Array], Array]] = {
+        "LuGre": lambda row: lugre.step(row[2], row[3]),
+        "DNLRX (10,0,3)": lambda row: dnlrx.step(row[1]),
+    }
     figures = []
-    for title, step in (
-        ("LuGre", lambda row: lugre.step(row[2], row[3])),
-        ("DNLRX (10,0,3)", lambda row: dnlrx.step(row[1])),
-    ):
+    for title, step in steps.items():
         start = time.process_time()
         for row in motion:
             step(row)

@@ -145,7 +145,7 @@ def _pulse(bench: Bench) -> Course:
 def _main_frequency(velocity: Array, period: float) -> float:
     """Reversals per second, by two [Hz]."""
     turns = float(np.count_nonzero(velocity[1:] * velocity[:-1] < 0.0))
-    return max(0.5 * turns / (velocity.shape[0] * period), 1e-9)
+    return float(max(0.5 * turns / (velocity.shape[0] * period), 1e-9))
 
 
 def _learning(bench: Bench) -> Course:
