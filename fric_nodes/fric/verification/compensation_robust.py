@@ -167,8 +167,8 @@ def _picture() -> tuple[go.Figure, str]:
         "time [s]",
     )
     return plot, (
-        "At rest with a friction 30 % too large, two samples of delay and a coarse encoder. Compensation on the measured velocity "
-        "cycles; on the reference's, as by default, the axis stands."
+        "At rest with a friction 30 % too large, two samples of delay and a coarse encoder. Compensation on the measured "
+        "velocity cycles; on the velocity of the reference, as by default, the axis stands."
     )
 
 
