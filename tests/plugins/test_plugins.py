@@ -16,6 +16,7 @@ import numpy as np
 import fric
 from fric.bench import BENCHMARKS
 from fric.control.feedbacks import CONTROLLERS
+from fric.control.feedforwards import FEEDFORWARDS
 from fric.effects import EFFECTS
 from fric.excitation import EXCITATIONS
 from fric.identification import METHODS
@@ -28,6 +29,7 @@ from other_axis.report import Own
 
 assert {"cubic_drag"} <= set(EFFECTS) and {"loaded_table"} <= set(PLANTS) and {"bump"} <= set(EXCITATIONS)
 assert {"as-given"} <= set(METHODS) and {"named"} <= set(CHECKS) and {"proportional"} <= set(CONTROLLERS)
+assert {"constant"} <= set(FEEDFORWARDS)
 assert {"nothing"} <= set(BENCHMARKS) and ".axislog" in suffixes()
 assert page_of(Own()) == "<html>its own page</html>"
 
@@ -49,7 +51,7 @@ mapping = {"time": {"from": "t", "unit": "s"}, "position": {"from": "q", "unit":
 assert fric.read("run.axislog", mapping=mapping).n_samples == 12000
 open("c.yaml", "w").write(
     "format: fric-controller/1\\nunits: {position: m, force: N}\\nperiod: 0.001\\n"
-    "controller: {type: proportional, gain: 2000.0}\\n"
+    "controller: {type: proportional, gain: 2000.0}\\nfeedforward: {type: constant, force: 0.5}\\n"
 )
 from dataclasses import replace
 followed = fric.simulate("coulomb,viscous", reference=replace(run, reference=run.position), controller="c.yaml")

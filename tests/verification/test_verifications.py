@@ -18,6 +18,8 @@ _LONG = {
     "amthor",
     "asperity-dwell",
     "calibration",
+    "compensation-guideway",
+    "compensation-robust",
     "free-oscillation",
     "online",
     "passivity",

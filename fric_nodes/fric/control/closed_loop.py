@@ -26,7 +26,6 @@ from ..signals.initial_state import initial_state
 from ..simulation import Simulator
 from .controller import Law, Setpoint
 from .controller_file import ControllerSettings
-from .feedforward import Feedforward
 
 __all__ = ["ClosedLoop", "ClosedLoopError", "closed_loop"]
 
@@ -78,10 +77,7 @@ def _law(
 ) -> tuple[Callable[[float, Array, float], float], Law]:
     """The controller in the middle of its work: its output from time, reference and reading; and what counts its limits."""
     h = settings.period
-    forward = None
-    if settings.feedforward is not None:
-        forward = Feedforward(h, preview=0.5 * h + settings.delay, transition_time=0.0)
-        forward.set_model(settings.feedforward, at_once=True)
+    forward = None if settings.feedforward is None else settings.feedforward.build(h, 0.5 * h + settings.delay)
 
     def ahead(time: float, wanted: Array) -> float:
         return 0.0 if forward is None else forward.step(time, *wanted.tolist())

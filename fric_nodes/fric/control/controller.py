@@ -6,14 +6,22 @@ A controller is one file in ``control/feedbacks/`` with a constant ``CONTROLLER`
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from ..errors import InputError
+from ..model import Model
 from ..parameter import Parameter
+from .tunable import Tunable
 
-__all__ = ["Controller", "Law", "Setpoint"]
+__all__ = ["ControlInputError", "Controller", "Law", "Setpoint", "check_inputs"]
+
+
+class ControlInputError(InputError):
+    """A sample that a control law can't answer."""
 
 
 class Setpoint(NamedTuple):
@@ -24,13 +32,28 @@ class Setpoint(NamedTuple):
     acceleration: float = 0.0
 
 
+def check_inputs(wanted: Setpoint, measured: float, duration: float, feedforward: float) -> None:
+    """Refuse what isn't finite; arguments as of :meth:`Law.answer`.
+
+    Raises:
+        ControlInputError: an input isn't finite, or the duration isn't positive.
+    """
+    if not math.isfinite(wanted.position + wanted.velocity + wanted.acceleration + measured + feedforward):
+        given = f"wanted {tuple(wanted)}, measured {measured}, feedforward {feedforward}"
+        raise ControlInputError("controller", f"an input is not finite ({given})", "leave the sample out")
+    if not 0.0 < duration < math.inf:
+        raise ControlInputError("controller", f"duration is {duration}", "give the time since the last sample, greater than 0")
+
+
 class Law(Protocol):
     """A controller at work, with its state."""
 
     limit: float
     """Largest output [F]."""
-    saturated: int
-    """Number of samples at which the limit took something away."""
+
+    @property
+    def saturated(self) -> int:
+        """Number of samples at which the limit took something away."""
 
     def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
         """Start in motion, as if it had been controlling before.
@@ -71,6 +94,8 @@ class Controller:
         source: where it comes from.
         designed: of a kind whose gains come from a design file, the kind that holds the one at a path; None: it has none.
         units: of position and force that a design holds for, as text; None: any.
+        from_model: parameters that an identified model gives, by name; None: there are none.
+        tunable: how its gains are made from an identified model; None: they are given by hand.
     """
 
     id: str
@@ -80,6 +105,8 @@ class Controller:
     source: str = ""
     designed: Callable[[Path], Controller] | None = field(default=None, repr=False)
     units: tuple[str, str] | None = None
+    from_model: Callable[[Model], dict[str, float]] | None = field(default=None, repr=False)
+    tunable: Tunable | None = field(default=None, repr=False)
 
     def refusal(self, values: Mapping[str, float]) -> str | None:
         """What is wrong with ``values``, or None when they can be used."""

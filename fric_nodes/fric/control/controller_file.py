@@ -9,8 +9,9 @@
     controller: {type: pid, proportional: 1.0e+5, integral: 1.0e+6, derivative: 400.0, filter_time: 5.0e-4}
     feedforward: {model: model.yaml}    # relative to this file; terms: [coulomb, viscous] takes these only
 
-The types are those of :data:`fric.control.feedbacks.CONTROLLERS`, each with the parameters that it declares, and those whose
-gains come from a design file with ``design``, its path relative to this file.
+The types of controllers are those of :data:`fric.control.feedbacks.CONTROLLERS`, each with the parameters that it declares, and
+those whose gains come from a design file with ``design``, its path relative to this file. Other feedforwards are named by their
+type, see :mod:`fric.control.feedforward_file`.
 """
 
 from __future__ import annotations
@@ -26,13 +27,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, create_model
 
 from ..errors import InputError
-from ..model import Model
 from ..model_file import read_model
 from ..record import Units
 from ..text_form import STRICT, Positive, UnitsEntry, field_of, line_of, loaded, text_of, validated
 from .controller import Controller
 from .feedbacks import CONTROLLERS
-from .feedforward import Feedforward
+from .feedforward_file import FeedforwardPlan, feedforward_of
 
 __all__ = ["FORMAT", "ControllerError", "ControllerSettings", "read_controller"]
 
@@ -44,12 +44,6 @@ class ControllerError(InputError):
     """A controller file that cannot be used."""
 
 
-class _FeedforwardEntry(BaseModel):
-    model_config = STRICT
-    model: str = Field(min_length=1)
-    terms: list[str] = []
-
-
 class _File(BaseModel):
     model_config = STRICT
     format: Literal["fric-controller/1"]
@@ -59,7 +53,7 @@ class _File(BaseModel):
     delay: NotNegative = 0.0
     force_limit: Positive | None = None
     resolution: NotNegative = 0.0
-    feedforward: _FeedforwardEntry | None = None
+    feedforward: dict[str, Any] | list[dict[str, Any]] | None = None
 
 
 @cache
@@ -87,7 +81,7 @@ class ControllerSettings:
         delay: from a reading until the force that answers it acts [s].
         force_limit: largest output [F].
         resolution: step of the encoder that is read [x]; 0: ideal.
-        feedforward: model whose force along the reference is added, with the terms that count; None: none.
+        feedforward: whose force along the reference is added; None: none.
     """
 
     units: Units
@@ -97,7 +91,7 @@ class ControllerSettings:
     delay: float = 0.0
     force_limit: float = math.inf
     resolution: float = 0.0
-    feedforward: Model | None = None
+    feedforward: FeedforwardPlan | None = None
 
 
 def read_controller(path: str | os.PathLike[str]) -> ControllerSettings:
@@ -116,7 +110,8 @@ def read_controller(path: str | os.PathLike[str]) -> ControllerSettings:
         raise ControllerError(
             f"{source}, line {line_of(tree, ('controller', 'type'))}", problem, f"use one of {', '.join(CONTROLLERS)}"
         )
-    given = validated(_entries()[kind.id], entry.controller, tree, source, ControllerError, ("controller",))
+    given_entry = _with_model(kind, dict(entry.controller), Path(source).parent)
+    given = validated(_entries()[kind.id], given_entry, tree, source, ControllerError, ("controller",))
     gains: dict[str, float] = given.model_dump(exclude={"type", "design"})
     units = Units(entry.units.position, entry.units.force)
     if kind.designed is not None:
@@ -125,15 +120,21 @@ def read_controller(path: str | os.PathLike[str]) -> ControllerSettings:
         if kind.units is not None:
             _same_units(Units(*kind.units), units, str(design), source)
     limit = math.inf if entry.force_limit is None else entry.force_limit
-    model = None
+    plan = None
     if entry.feedforward is not None:
-        at = Path(source).parent / entry.feedforward.model
-        model = Feedforward(entry.period, terms=entry.feedforward.terms).selected(read_model(at))
-        _same_units(model.units, units, str(at), source)
-    return ControllerSettings(units, entry.period, kind, gains, entry.delay, limit, entry.resolution, model)
+        plan = feedforward_of(entry.feedforward, units, Path(source).parent)
+        plan.build(entry.period, 0.5 * entry.period + entry.delay)  # what can't be used is said now
+    return ControllerSettings(units, entry.period, kind, gains, entry.delay, limit, entry.resolution, plan)
 
 
 def _same_units(one: Units, other: Units, source: str, file: str) -> None:
     if one != other:
         problem = f"units are {one.position} and {one.force}, those of {file} are {other.position} and {other.force}"
-        raise ControllerError(source, problem, "give gains and model in the same units")
+        raise ControllerError(source, problem, "give gains and design in the same units")
+
+
+def _with_model(kind: Controller, entry: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """``entry`` with the gains that the file of a model under its key ``model`` gives and that aren't given themselves."""
+    if kind.from_model is None or "model" not in entry:
+        return entry
+    return kind.from_model(read_model(folder / str(entry.pop("model")))) | entry

@@ -48,6 +48,7 @@ class _Voice:
         self._fade_time = rest_fade_time
         self._at_rest = 0.0
         self._friction = 0.0
+        self.friction = 0.0
         self._inputs = np.zeros((4, 1))
 
     def command(self, time: float, position: float, velocity: float, acceleration: float, duration: float) -> float:
@@ -62,6 +63,7 @@ class _Voice:
         inputs = self._inputs
         inputs[0, 0], inputs[1, 0], inputs[2, 0], inputs[3, 0] = time, position, velocity, acceleration
         effort, friction = predictor.run(inputs[0], inputs[1], inputs[2], inputs[3], duration)
+        self.friction = float(friction[0])
         if self._keeps_state:
             return float(effort[0])
         if velocity != 0.0:
@@ -70,7 +72,8 @@ class _Voice:
             return float(effort[0])
         self._at_rest += duration
         left = 1.0 - self._at_rest / self._fade_time if self._fade_time > 0.0 else 0.0
-        return float(effort[0]) + self._friction * max(left, 0.0)
+        self.friction = self._friction * max(left, 0.0)
+        return float(effort[0]) + self.friction
 
 
 class Feedforward:
@@ -89,6 +92,7 @@ class Feedforward:
         enabled: may be changed at any time.
         include_inertia: may be changed at any time.
         preview: may be changed at any time.
+        friction: share of the last force that is friction [F].
     """
 
     def __init__(
@@ -110,6 +114,7 @@ class Feedforward:
         self.include_inertia = include_inertia
         self.enabled = enabled
         self._model: Model | None = None
+        self.friction = 0.0
         self.reset()
 
     def reset(self) -> None:
@@ -118,6 +123,7 @@ class Feedforward:
         self._gain = 1.0 if self.enabled else 0.0
         self._time: float | None = None
         self._acceleration = 0.0
+        self.friction = 0.0
 
     def _voice(self, model: Model | None, weight: float) -> _Voice:
         return _Voice(model, weight, self._rest_fade_time)
@@ -197,7 +203,9 @@ class Feedforward:
         if not self.include_inertia:
             acceleration = 0.0
         self._mix(duration)
-        total = 0.0
+        total = friction = 0.0
         for voice in self._voices:
             total += voice.weight * voice.command(time + ahead, position, velocity, acceleration, duration)
+            friction += voice.weight * voice.friction
+        self.friction = self._gain * friction
         return self._gain * total

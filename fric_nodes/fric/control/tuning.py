@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -28,6 +27,7 @@ from scipy.optimize import minimize
 from ..errors import InputError
 from ..record import Array
 from .feedbacks.pid import PidGains
+from .loop import LoopMargins
 
 __all__ = ["LoopMargins", "TuningError", "loop_margins", "tune"]
 
@@ -36,31 +36,6 @@ Complex = NDArray[np.complex128]
 
 class TuningError(InputError):
     """A loop for which no gains are found."""
-
-
-@dataclass(frozen=True)
-class LoopMargins:
-    """How far a closed loop is from its limits.
-
-    Attributes:
-        gain_margin: factor by which the gain may rise [1].
-        phase_margin: smallest over all crossovers [deg].
-        delay_margin: delay that may be added [s].
-        sensitivity: largest |S|, M_s [1].
-        complementary: largest |T|, M_t [1].
-        crossover: highest frequency with |L| = 1 [Hz].
-        bandwidth: lowest frequency at which |S| reaches 1/sqrt(2) [Hz].
-        stable: all poles inside the unit circle.
-    """
-
-    gain_margin: float
-    phase_margin: float
-    delay_margin: float
-    sensitivity: float
-    complementary: float
-    crossover: float
-    bandwidth: float
-    stable: bool
 
 
 class _Loop:

@@ -21,19 +21,60 @@ from typing import Any
 
 import numpy as np
 
-from ..engine.kernel import loop
+from ..axis import Measurement
+from ..engine.kernel import kernel, local_array, loop
 from ..record import Array, Record
 
-__all__ = ["SAMPLE_TIME", "graded_strokes", "recorded", "wandering"]
+__all__ = ["SAMPLE_TIME", "Guideway", "graded_strokes", "recorded", "wandering"]
 
 SAMPLE_TIME = 1.6e-4  # [s] of the controller and of the recording
 ELEMENTS = 150
 _FINE = 10
+_READINGS, _BETWEEN = 4, 3  # interferometer at 25 kHz, and steps between two of its readings
 _MASS, _VISCOUS, _LAG = 0.6, 2.0, 1e-4  # [kg], [N s/m], [s]
 _COULOMB, _STATIC, _STRIBECK = 0.6, 0.75, 2e-3  # [N], [N], [m/s]
 _STIFFNESS, _ATTRACTION, _BRISTLE_DAMPING = 6e5, 30.0, 60.0  # [N/m], [N/s], [N s/m]
 _GAINS = np.array([1.31e5, 3.57e7, 479.0, 3.2e-4])  # kp, ki, kd, filter time
 _POSITION_NOISE, _RESOLUTION, _FORCE_NOISE = 1e-10, 1e-10, 2e-4  # [m], [m], [N]
+
+
+@kernel
+def _moved(x: Any, command: float, inner: float, n: int, share: Any, stiffness: Any, element: Any, slides: Any) -> float:
+    """Lead position, velocity and force ``x`` over ``n`` steps of ``inner`` [s] under ``command`` [N]; mean force [N]."""
+    q, v, u = x[0], x[1], x[2]
+    mean = 0.0
+    for _ in range(n):
+        u += (command - u) * inner / _LAG
+        friction, sticking = 0.0, 0.0
+        for i in range(share.shape[0]):
+            friction += element[i]
+            sticking += 0.0 if slides[i] else share[i]
+        friction += _BRISTLE_DAMPING * v * sticking
+        before = v
+        v += inner / _MASS * (u - friction - _VISCOUS * v)
+        q += inner * v
+        mean += u / n
+        level = _COULOMB + (_STATIC - _COULOMB) * math.exp(-((v / _STRIBECK) ** 2))
+        turned = before * v <= 0.0
+        way = 1.0 if v > 0.0 else -1.0
+        for i in range(share.shape[0]):
+            limit = share[i] * level
+            if turned:
+                slides[i] = False
+            if slides[i]:
+                element[i] += inner * way * _ATTRACTION * share[i] * (1.0 - way * element[i] / limit)
+            else:
+                element[i] += inner * stiffness[i] * v
+                if way * element[i] >= limit:
+                    element[i] = way * limit
+                    slides[i] = True
+    x[0], x[1], x[2] = q, v, u
+    return mean
+
+
+@loop
+def _led(x: Any, command: float, inner: float, n: int, share: Any, stiffness: Any, element: Any, slides: Any) -> float:
+    return float(_moved(x, command, inner, n, share, stiffness, element, slides))
 
 
 @loop
@@ -42,12 +83,13 @@ def _closed_loop(
     position_out: Any, force_out: Any,
 ) -> None:  # fmt: skip
     """The axis under its controller along ``wanted``; ``position_out`` as measured, ``force_out`` the mean since the last."""
-    q, v, u = 0.0, 0.0, 0.0
+    x = local_array(3)
+    x[0] = x[1] = x[2] = 0.0
     integral, rate, last = 0.0, 0.0, 0.0
     mean = 0.0
     inner = h / _FINE
     for k in range(wanted.shape[0]):
-        seen = round((q + noise[k]) / _RESOLUTION) * _RESOLUTION
+        seen = round((x[0] + noise[k]) / _RESOLUTION) * _RESOLUTION
         position_out[k] = seen
         force_out[k] = mean
         error = wanted[k] - seen
@@ -55,32 +97,7 @@ def _closed_loop(
         rate += h / (h + gains[3]) * ((error - last) / h - rate)
         last = error
         command = gains[0] * error + integral + gains[2] * rate
-        mean = 0.0
-        for _ in range(_FINE):
-            u += (command - u) * inner / _LAG
-            friction, sticking = 0.0, 0.0
-            for i in range(share.shape[0]):
-                friction += element[i]
-                sticking += 0.0 if slides[i] else share[i]
-            friction += _BRISTLE_DAMPING * v * sticking
-            before = v
-            v += inner / _MASS * (u - friction - _VISCOUS * v)
-            q += inner * v
-            mean += u / _FINE
-            level = _COULOMB + (_STATIC - _COULOMB) * math.exp(-((v / _STRIBECK) ** 2))
-            turned = before * v <= 0.0
-            way = 1.0 if v > 0.0 else -1.0
-            for i in range(share.shape[0]):
-                limit = share[i] * level
-                if turned:
-                    slides[i] = False
-                if slides[i]:
-                    element[i] += inner * way * _ATTRACTION * share[i] * (1.0 - way * element[i] / limit)
-                else:
-                    element[i] += inner * stiffness[i] * v
-                    if way * element[i] >= limit:
-                        element[i] = way * limit
-                        slides[i] = True
+        mean = _moved(x, command, inner, _FINE, share, stiffness, element, slides)
 
 
 def _population() -> tuple[Array, Array]:
@@ -93,6 +110,50 @@ def _population() -> tuple[Array, Array]:
     stiffness = _STIFFNESS * ((1.0 - edges[:-1]) ** 2 - (1.0 - edges[1:]) ** 2)
     held = stiffness * middle
     return held / held.sum(), stiffness
+
+
+class Guideway:
+    """The axis in the hands of any controller, of which every period holds ``_READINGS`` readings that are averaged.
+
+    Args:
+        seed: of the noise.
+    """
+
+    def __init__(self, seed: int) -> None:
+        share, stiffness = _population()
+        self._axis = share, stiffness, np.zeros(ELEMENTS), np.zeros(ELEMENTS, dtype=np.bool_)
+        self._x = np.zeros(3)
+        self._random = np.random.default_rng(seed)
+        self._read, self._n_read = 0.0, 0
+        self._impulse = self._elapsed = 0.0
+        self._before = 0.0
+
+    @property
+    def position(self) -> float:
+        """True position [m]."""
+        return float(self._x[0])
+
+    def _reading(self) -> float:
+        return _RESOLUTION * round((self.position + _POSITION_NOISE * self._random.standard_normal()) / _RESOLUTION)
+
+    def advance(self, force: float, duration: float) -> None:
+        """Lead it over ``duration`` [s] under the command ``force`` [N]."""
+        inner = duration / (_READINGS * _BETWEEN)
+        for _ in range(_READINGS):
+            mean = _led(self._x, force, inner, _BETWEEN, *self._axis)
+            self._impulse += mean * inner * _BETWEEN
+            self._read += self._reading()
+        self._n_read += _READINGS
+        self._elapsed += duration
+
+    def measure(self) -> Measurement:
+        """What interferometer and current probe say about the time since they were last asked."""
+        seen = self._read / self._n_read if self._n_read else self._reading()
+        rate = (seen - self._before) / self._elapsed if self._elapsed else 0.0
+        effort = self._impulse / self._elapsed if self._elapsed else 0.0
+        effort += _FORCE_NOISE * float(self._random.standard_normal())
+        self._before, self._read, self._n_read, self._impulse, self._elapsed = seen, 0.0, 0, 0.0, 0.0
+        return Measurement(seen, rate, effort)
 
 
 def recorded(wanted: Array, seed: int, sample_time: float = SAMPLE_TIME, keep: int = 1) -> Record:

@@ -15,11 +15,16 @@ Source: Leonhard 2001, Control of Electrical Drives, chapter 15.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+
+import numpy as np
 
 from ...errors import InputError
 from ...parameter import Parameter
 from ..controller import Controller, Setpoint
+from ..loop import Polynomials, added
+from ..tunable import Basis, Tunable
 
 __all__ = ["CONTROLLER", "Cascade", "CascadeGains"]
 
@@ -109,6 +114,32 @@ class Cascade:
         return self.step(wanted.position, wanted.velocity, measured, duration, feedforward)
 
 
+def _gains(basis: Basis) -> dict[str, float]:
+    """With v = dy/dt and c = 1 the cascade is a PID of k_p = k_v k_pos + k_i, k_i k_pos and k_v, which is solved for k_pos.
+
+    That has a solution while the PID's zeros are real: of its integral gain no more than that is kept.
+    """
+    kp, kd = basis.pid["proportional"], basis.pid["derivative"]
+    ki = 0.0 if basis.calm > 0 else min(basis.pid["integral"], 0.24 * kp * kp / kd)
+    position = (kp + math.sqrt(kp * kp - 4.0 * ki * kd)) / (2.0 * kd)
+    return {
+        "position_gain": position,
+        "velocity_gain": kd,
+        "velocity_integral": ki / position,
+        "velocity_weight": 1.0,
+        "filter_time": basis.pid["filter_time"],
+    }
+
+
+def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
+    k, time = values["position_gain"], values["filter_time"]
+    inner = added([(np.array([k]), np.array([1.0])), (np.array([1.0, -1.0]), np.array([time + period, -time]))])
+    gain = (np.array([values["velocity_gain"]]), np.array([1.0]))
+    if values["velocity_integral"] > 0.0:
+        gain = added([gain, (np.array([values["velocity_integral"] * period, 0.0]), np.array([1.0, -1.0]))])
+    return [(np.asarray(np.polymul(inner[0], gain[0])), np.asarray(np.polymul(inner[1], gain[1])))]
+
+
 CONTROLLER = Controller(
     id="cascade",
     title="cascade of position and velocity control (P-PI)",
@@ -121,4 +152,5 @@ CONTROLLER = Controller(
     ),
     build=lambda values, limit: Cascade(CascadeGains(**values), limit),
     source="Leonhard 2001, Control of Electrical Drives, chapter 15",
+    tunable=Tunable(_gains, _linear),
 )

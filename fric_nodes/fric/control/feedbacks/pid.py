@@ -16,11 +16,14 @@ Source: Astrom and Hagglund 2006, Advanced PID Control, sections 3.2 to 3.5 and 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...errors import InputError
 from ...parameter import Parameter
 from ..controller import Controller, Setpoint
+from ..loop import Polynomials, pid_polynomials
+from ..tunable import Basis, Tunable
 
 __all__ = ["CONTROLLER", "Pid", "PidError", "PidGains"]
 
@@ -157,6 +160,20 @@ class Pid:
         return self.step(wanted.position, measured, duration, feedforward)
 
 
+_PID = ("proportional", "integral", "derivative", "filter_time")
+
+
+def _gains(basis: Basis) -> dict[str, float]:
+    # Against hunting there is no other remedy in a PID than to do without its integral.
+    without = {"integral": 0.0} if basis.calm > 0 else {}
+    return {**basis.pid, "position_weight": 1.0, "velocity_weight": 1.0, "tracking_time": 0.0, **without}
+
+
+def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
+    kp, ki, kd, filter_time = (values[name] for name in _PID)
+    return [pid_polynomials(kp, ki, kd, filter_time, period)]
+
+
 CONTROLLER = Controller(
     id="pid",
     title="PID controller of the position",
@@ -171,4 +188,5 @@ CONTROLLER = Controller(
     ),
     build=lambda values, limit: Pid(PidGains(**values), limit),
     source="Astrom and Hagglund 2006, Advanced PID Control",
+    tunable=Tunable(_gains, _linear),
 )

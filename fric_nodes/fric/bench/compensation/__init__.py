@@ -1,0 +1,1 @@
+"""What the benchmark ``compensation`` consists of: axes, methods, and their meeting."""

@@ -1,0 +1,130 @@
+"""PID whose integral is reset when the error passes zero, against hunting.
+
+Equation: the PID of :mod:`.pid`, and at each sample at which the error has passed zero, while the reference is slower than v_r,
+
+    I = r I,
+
+with r = 0 the integrator of Clegg: after an overshoot the integral starts anew instead of having to be emptied first, which is
+what makes an axis with friction hunt. A factor near 1 leaves a part of the hunting. Within ``dead_zone`` the integral is held:
+an encoder that can't show a smaller error gives none that could be integrated. Passing zero counts once the error has left the
+dead zone on the other side, so that the encoder's flicker is no passing.
+
+A constant force beside friction (gravity) is in the integral too, and a reset takes it away: give it as feedforward.
+Source: Clegg 1958; Beerens, Bisoffi, Zaccarian, Heemels, Nijmeijer, van de Wouw 2019, Automatica 107.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from ...parameter import Parameter
+from ..controller import Controller, Setpoint, check_inputs
+from ..loop import Polynomials, pid_polynomials
+from ..tunable import Basis, Tunable
+from .pid import PidGains
+
+__all__ = ["CONTROLLER", "ResetIntegral"]
+
+
+class ResetIntegral:
+    """The controller with its state.
+
+    Args:
+        gains: of the PID.
+        reset_factor: r [1].
+        dead_zone: error within which the integral is held [x].
+        slow: v_r, speed of the reference up to which the integral is reset [x/s].
+        limit: largest output [F].
+
+    Attributes:
+        saturated: number of samples at which the limit took something away.
+        resets: number of resets.
+    """
+
+    def __init__(
+        self, gains: PidGains, reset_factor: float = 0.0, dead_zone: float = 0.0, slow: float = 0.0, limit: float = math.inf
+    ) -> None:
+        self.gains = gains
+        self.limit = limit
+        self._factor, self._dead_zone, self._slow = reset_factor, dead_zone, slow
+        self.saturated = self.resets = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Start anew, at rest."""
+        self._integral = self._derivative = 0.0
+        self._before: float | None = None
+        self._side = 0.0
+
+    def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
+        """Start in motion, see :meth:`fric.control.controller.Law.begin`."""
+        gains = self.gains
+        error, rate = wanted.position - state[0], wanted.velocity - state[1]
+        self._before, self._derivative = error - duration * rate, gains.derivative * rate
+        self._integral = force - gains.proportional * error - self._derivative if gains.integral > 0.0 else 0.0
+        self._side = 0.0
+
+    def answer(self, wanted: Setpoint, measured: float, duration: float, feedforward: float = 0.0) -> float:
+        """See :meth:`fric.control.controller.Law.answer`.
+
+        Raises:
+            ControlInputError: an input isn't finite, or the duration isn't positive; the state is left as it was.
+        """
+        check_inputs(wanted, measured, duration, feedforward)
+        gains = self.gains
+        error = wanted.position - measured
+        before = error if self._before is None else self._before
+        self._before = error
+        if abs(error) > self._dead_zone:
+            side = math.copysign(1.0, error)
+            if side * self._side < 0.0 and abs(wanted.velocity) <= self._slow:
+                self._integral *= self._factor
+                self.resets += 1
+            self._side = side
+            self._integral += gains.integral * duration * error
+        filtered = gains.filter_time * self._derivative + gains.derivative * (error - before)
+        self._derivative = filtered / (gains.filter_time + duration)
+        free = gains.proportional * error + self._integral + self._derivative + feedforward
+        output = min(max(free, -self.limit), self.limit)
+        if output != free:
+            self.saturated += 1
+            time = gains.anti_windup_time
+            if math.isfinite(time):
+                self._integral += (output - free) * duration / max(time, duration)
+        return output
+
+
+def _build(given: dict[str, float], limit: float) -> ResetIntegral:
+    gains = PidGains(given["proportional"], given["integral"], given["derivative"], given["filter_time"])
+    return ResetIntegral(gains, given["reset_factor"], given["dead_zone"], given["slow"], limit)
+
+
+_PID = ("proportional", "integral", "derivative", "filter_time")
+
+
+def _gains(basis: Basis) -> dict[str, float]:
+    return {**basis.pid, "reset_factor": 0.0, "dead_zone": basis.dead_zone, "slow": 0.0}
+
+
+def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
+    kp, ki, kd, filter_time = (values[name] for name in _PID)
+    return [pid_polynomials(kp, ki, kd, filter_time, period)]
+
+
+CONTROLLER = Controller(
+    id="reset_integral",
+    title="PID controller whose integral is reset when the error passes zero",
+    parameters=(
+        Parameter("proportional", "k_p", "F/x", "proportional gain", lower=0.0),
+        Parameter("integral", "k_i", "F/(x s)", "integral gain", lower=0.0),
+        Parameter("derivative", "k_d", "F s/x", "derivative gain", lower=0.0),
+        Parameter("filter_time", "T_f", "s", "time constant of the derivative's filter", lower=0.0, default=0.0),
+        Parameter("reset_factor", "r", "1", "what the integral is multiplied by at a reset", 0.0, 1.0, default=0.0),
+        Parameter("dead_zone", "e_d", "x", "error within which the integral is held", lower=0.0, default=0.0),
+        Parameter("slow", "v_r", "x/s", "speed of the reference up to which it is reset", lower=0.0, default=0.0),
+    ),
+    build=lambda values, limit: _build(dict(values), limit),
+    source="Clegg 1958; Beerens et al. 2019, Automatica 107",
+    tunable=Tunable(_gains, _linear),
+)

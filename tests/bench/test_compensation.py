@@ -1,0 +1,81 @@
+"""The comparison of methods of compensation: its reckoning by hand, and one axis from recording to figures."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from fric.bench.benchmarks.compensation import figures_of, step_times
+from fric.bench.compensation.axes import AXES
+from fric.bench.compensation.competition import Cell, Outcome, compete, interval, table
+from fric.bench.compensation.methods import METHODS, peak_at_reversals
+from fric.control.trial import Course, sine
+from fric.errors import InputError
+
+
+def test_interval_by_hand() -> None:
+    middle, low, high = interval(np.array([2.0, 8.0]))
+    assert middle == pytest.approx(4.0)
+    # Two values: t of 90 % with one degree of freedom is 6.314; their logarithms scatter by log(4)/sqrt(2).
+    half = 6.3138 * math.log(4.0) / math.sqrt(2.0) / math.sqrt(2.0)
+    assert (low, high) == pytest.approx((4.0 * math.exp(-half), 4.0 * math.exp(half)), rel=1e-3)
+    assert interval(np.array([3.0]))[1:] == (0.0, math.inf)
+
+
+def test_peaks_are_those_after_reversals() -> None:
+    reference = sine(1e-3, 1.0, 1.0, 4.0)
+    error = np.zeros(4000)
+    turns = [round(1e3 * (0.25 + 0.5 * k)) for k in range(8)]
+    for k in turns:
+        error[k + 10] = 0.3
+    error[1500] = 5.0  # in the middle of a stroke
+    zero = np.zeros(4000)
+    course = Course(reference, reference.position - error, zero, zero, zero, zero, 0, True)
+    assert peak_at_reversals(course, 2000) == pytest.approx(0.3)
+
+
+def test_a_failure_is_told_and_counts_for_nothing() -> None:
+    good, bad = Outcome(1.0, 2.0, 3.0, 0), Outcome(math.nan, math.nan, math.nan, 0, "unstable")
+    rows = table([Cell("slide", "pid", (good, good)), Cell("slide", "other", (bad, bad))])
+    assert rows[1][2] == "unstable"
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(InputError, match="no method 'magic'"):
+        compete([1], ["slide"], ["magic"])
+    with pytest.raises(InputError, match="no axis 'boat'"):
+        compete([1], ["boat"])
+
+
+def test_drawn_axes_differ_within_a_fifth() -> None:
+    axis = AXES["slide"]
+    names = [p.name for p in axis.nominal.parameters()]
+    ratio = axis.drawn(7).values / axis.nominal.values
+    assert np.all(np.abs(ratio - 1.0) <= 0.2 + 1e-12)
+    assert ratio[names.index("stribeck.exponent")] == 1.0
+    assert np.ptp(ratio) > 0.05
+
+
+def test_a_compensator_takes_microseconds() -> None:
+    figures = step_times()
+    assert len(figures) == 4
+    # Processor time, of a machine that may be busy with other things: a factor of three is left.
+    assert all(figure.value < 3.0 * float(figure.goal.split()[1]) for figure in figures)
+
+
+@pytest.mark.long
+def test_models_beat_tables_on_the_slide() -> None:
+    methods = ["pid", "pid + velocity", "pid + table", "pid + pre-sliding model", "friction observer + velocity"]
+    cells = compete([11], ["slide"], methods)
+    rms = {cell.method: float(cell.values("rms")[0]) for cell in cells}
+    assert rms["pid + table"] < 0.6 * rms["pid + velocity"]
+    assert rms["pid + pre-sliding model"] < 0.3 * rms["pid + table"]
+    assert rms["friction observer + velocity"] < rms["pid + table"]
+    goals = [figure for figure in figures_of(cells) if figure.goal]
+    assert goals
+    assert all(figure.reached for figure in goals), goals
+
+
+def test_every_method_has_a_name_of_its_own() -> None:
+    assert len(METHODS) >= 12
