@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from fric.report.figures import COLOURS
@@ -48,7 +49,8 @@ def write_picture(outcome: DemoOutcome, path: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
         axes.grid(color="#e8edf2")
     with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
-        canvas.print_png(file)  # type: ignore[no-untyped-call]
+        drawn: Any = canvas  # its methods are typed in some versions and not in others
+        drawn.print_png(file)
     written = Path(file.name)
     written.chmod(0o644)
     written.replace(path)
