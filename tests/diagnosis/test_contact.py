@@ -145,4 +145,4 @@ def test_the_command_holds_blocks_of_one_recording_back(tmp_path: Path) -> None:
     for wrong in ([], ["--blocks", "4", "--validate", str(bag)]):
         refused = CliRunner().invoke(build_app(), [*command, *wrong])
         assert isinstance(refused.exception, InputError)
-        assert "--blocks" in str(refused.exception) or "learnt from" in str(refused.exception)
+        assert "--blocks" in str(refused.exception) or "both fitted and validated" in str(refused.exception)

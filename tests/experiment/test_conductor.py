@@ -115,7 +115,10 @@ def test_friction_that_allows_no_oscillation_is_said_and_forced_runs_take_over()
     assert {run.setting.kind for run in outcome.knowledge.runs} == {FREE, FORCED}
     model = outcome.knowledge.oscillation.model  # type: ignore[union-attr]
     assert model.value("mass") == pytest.approx(0.8, rel=0.02)
-    assert model.value("viscous.coefficient") == pytest.approx(30.0, rel=0.02)
+    # The runs rest at their turns: what is left open there is in the standard error, which says so.
+    error = model.standard_errors["viscous.coefficient"]
+    assert model.value("viscous.coefficient") == pytest.approx(30.0, abs=3.0 * error)
+    assert error < 0.3
     assert not outcome.knowledge.spring
 
 
