@@ -199,6 +199,9 @@ _SCREWS = (
 )
 _TIAGO = "fric import tiago_effort.csv --map config/published/torso.yaml --repair --out bags/torso"
 
+_BRIDGE = "ros2 run fric_nodes hardware_bridge --ros-args --params-file config/hardware_bridge.yaml"
+_BRIDGE_NODE = ROOT / "fric_nodes" / "fric_nodes" / "nodes" / "hardware_bridge.py"
+
 KNOWN: dict[str, Case] = {
     **dict.fromkeys(_TUTORIAL, Case(checked=_by_tutorial)),
     "python3 -m venv env && . env/bin/activate && pip install . && fric demo --out demo": Case(
@@ -259,16 +262,15 @@ KNOWN: dict[str, Case] = {
     **{
         f"fric bench {name}": _long(4 * 3600.0, status=(0, 1))
         for name in (
-            "lock-step",
-            "recordings",
-            "fitting",
-            "laws",
-            "calibration",
-            "calibration-oscillation",
-            *(f"calibration-{name}" for name in ("forced", "static", "two-stage", "tensor-product")),
-            "online",
+            *("lock-step", "recordings", "fitting", "laws", "online", "faults", "tensor-product-control", "calibration"),
+            *(f"calibration-{name}" for name in ("oscillation", "forced", "static", "two-stage", "tensor-product")),
         )
     },
+    "pip install 'fric[can]'": Case(checked=lambda: "\ncan = [" in (ROOT / "pyproject.toml").read_text(encoding="utf-8")),
+    f"{_BRIDGE} -p driver:=serial -p serial.port:=/dev/ttyACM0": Case(node="hardware_bridge"),
+    "ros2 service call /hardware_bridge/enable std_srvs/srv/Trigger": Case(
+        checked=lambda: "~/enable" in _BRIDGE_NODE.read_text()
+    ),
     _TRIBOMETER: Case((_published("test_data_2.txt"),), data=True),
     "fric diagnose bags/tribometer --blocks 6 --start 8.5 --end 204 --model config/published/tribometer_nominal.yaml "
     "--out diagnosis": _long(needs=(_after(_TRIBOMETER),), data=True),
