@@ -11,7 +11,7 @@ follow from messages arriving in the order in which they were sent:
 
 from __future__ import annotations
 
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 __all__ = ["Answers", "Matching", "Stream"]
 
@@ -93,17 +93,17 @@ class Answers(Generic[Question, Answer]):
 
 
 class Matching(Generic[State]):
-    """A state that waits for one number from each of several senders, all with the state's own stamp.
+    """A state that waits for one value from each of several senders, all with the state's own stamp.
 
     Args:
         senders: number of senders.
     """
 
     def __init__(self, senders: int) -> None:
-        self._streams: list[Stream[float]] = [Stream() for _ in range(senders)]
+        self._streams: list[Stream[Any]] = [Stream() for _ in range(senders)]
         self._pending: tuple[int, State] | None = None
 
-    def put(self, sender: int, stamp: int, value: float) -> None:
+    def put(self, sender: int, stamp: int, value: Any) -> None:
         """Take in ``value`` of sender number ``sender`` for the sample ``stamp`` [ns]."""
         self._streams[sender].put(stamp, value)
 
@@ -111,8 +111,8 @@ class Matching(Generic[State]):
         """``state`` of the sample ``stamp`` [ns] waits from now on, instead of an earlier one."""
         self._pending = stamp, state
 
-    def complete(self) -> tuple[State, list[float]] | None:
-        """The state that waits and the senders' numbers; None as long as one is missing."""
+    def complete(self) -> tuple[State, list[Any]] | None:
+        """The state that waits and the senders' values; None as long as one is missing."""
         if self._pending is None:
             return None
         stamp, state = self._pending

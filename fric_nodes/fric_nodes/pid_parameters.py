@@ -1,13 +1,20 @@
-"""The gains of the node ``pid`` as ROS parameters, all settable while it runs."""
+"""The control law of the node ``pid``: its own gains as ROS parameters, settable while it runs, or a controller file."""
 
 from __future__ import annotations
 
-from fric.control.feedbacks.pid import PidGains
+from fric.control.controller import Law
+from fric.control.controller_file import read_controller
+from fric.control.feedbacks.pid import Pid, PidGains
+from fric.errors import InputError
 
 from .parameters import NodeParameter, Settings
 
-__all__ = ["GAINS", "gains_of"]
+__all__ = ["CONTROLLER_FILE", "GAINS", "gains_of", "law_of"]
 
+_SAME = 1e-6  # numerical: relative difference of two periods that are meant to be one
+CONTROLLER_FILE = NodeParameter(
+    "controller_file", "", "a fric-controller/1 file: its controller takes the place of the PID and its gains; empty: none"
+)
 _LARGEST = 1e12  # physical scale: far above any gain or force of an axis
 GAINS = (
     NodeParameter("kp", 1e5, "proportional gain", "N/m or N m/rad", 0.0, _LARGEST, settable=True),
@@ -32,3 +39,20 @@ def gains_of(settings: Settings) -> PidGains:
         value("kp"), value("ki"), value("kd"), value("filter_time"), value("position_weight"), value("velocity_weight"),
         value("tracking_time"),
     )  # fmt: skip
+
+
+def law_of(settings: Settings, period: float) -> Law:
+    """The law that answers joint states every ``period`` [s].
+
+    Raises:
+        InputError: a gain can't be used; or the controller file, or it is for another period, or names a feedforward.
+    """
+    path, limit = settings.text(CONTROLLER_FILE.name), settings.number("force_limit")
+    if not path:
+        return Pid(gains_of(settings), limit)
+    found = read_controller(path)
+    if abs(found.period - period) > _SAME * period:
+        raise InputError(path, f"is for a period of {found.period:g} s, this node's is {period:g} s", "give both the same")
+    if found.feedforward is not None:
+        raise InputError(path, "names a feedforward, which this node doesn't compute", "leave it to the node compensator")
+    return found.kind.build(found.gains, min(limit, found.force_limit))

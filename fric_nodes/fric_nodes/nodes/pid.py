@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
+from fric.control.controller import Setpoint
 from fric.control.feedbacks.pid import Pid
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
@@ -25,7 +26,7 @@ from ..forces import STAMPED, ForcePublisher, force_in, force_type, reference_in
 from ..lockstep import Matching
 from ..loop import LOCK_STEP, PERIOD, LoopNode
 from ..parameters import NodeParameter
-from ..pid_parameters import GAINS, gains_of
+from ..pid_parameters import CONTROLLER_FILE, GAINS, gains_of, law_of
 from ..qos import SAMPLES
 from ..run import run
 from ..wall_time import REFERENCES, STATES, WallControl
@@ -37,6 +38,7 @@ PARAMETERS = (
     PERIOD,
     LOCK_STEP,
     *GAINS,
+    CONTROLLER_FILE,
     NodeParameter("use_feedforward", True, "add the feedforward force; in lock-step false means not to wait for one"),
     NodeParameter("feedforward_timeout", 0.1, "wall time: leave out a feedforward that is older", "s", 1e-3, 1e6),
     *REFERENCES,
@@ -46,7 +48,7 @@ PARAMETERS = (
 
 
 class PidNode(LoopNode):
-    """A PID controller; options as for ``rclpy.node.Node``.
+    """A PID controller, or the one of a file; options as for ``rclpy.node.Node``.
 
     Raises:
         InputError: a parameter can't be used.
@@ -55,12 +57,12 @@ class PidNode(LoopNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("pid", PARAMETERS, **options)
         settings = self.settings
-        self._pid = Pid(gains_of(settings), settings.number("force_limit"))
+        self._law = law_of(settings, self.period)
         settings.when_changed(self._on_settings)
         self._adds = settings.flag("use_feedforward")
         self._answered = -1
         self._matching: Matching[JointSample] = Matching(2 if self._adds else 1)
-        self._wall = WallControl(self, self._pid)
+        self._wall = WallControl(self, self._law)
         self._feedforward = (-math.inf, 0.0)
         self._commands = ForcePublisher(self, "force_command")
         self.create_subscription(JointState, "joint_states", self._on_state, SAMPLES)
@@ -69,12 +71,13 @@ class PidNode(LoopNode):
             self.create_subscription(force_type(self), "feedforward_force", self._on_feedforward, SAMPLES)
 
     def _on_settings(self, _changed: set[str]) -> None:
-        self._pid.set_gains(gains_of(self.settings))
-        self._pid.limit = self.settings.number("force_limit")
+        if isinstance(self._law, Pid):  # a file's gains are the file's
+            self._law.set_gains(gains_of(self.settings))
+            self._law.limit = self.settings.number("force_limit")
 
     def condition(self) -> Mapping[str, str]:
         """What the node adds to its report."""
-        return {"saturated": str(self._pid.saturated), "reference": self._wall.following}
+        return {"saturated": str(self._law.saturated), "reference": self._wall.following}
 
     def _on_reference(self, message: Reference) -> None:
         reference = self.usable("reference", reference_in, message)
@@ -83,7 +86,7 @@ class PidNode(LoopNode):
         if not self.lock_step:
             self._wall.reference(reference)
             return
-        self._matching.put(_REFERENCE, reference.stamp, reference.position)
+        self._matching.put(_REFERENCE, reference.stamp, Setpoint(*reference[1:]))
         self._answer()
 
     def _on_feedforward(self, message: StampedForce | Float64) -> None:
@@ -109,7 +112,7 @@ class PidNode(LoopNode):
             return
         if state.stamp < self._answered:
             self.counters["restarts"] += 1
-            self._pid.reset()
+            self._law.reset()
         self._matching.ask(state.stamp, state)
         self._answer()
 
@@ -118,8 +121,8 @@ class PidNode(LoopNode):
         complete = self._matching.complete() if self.has_audience(self._commands.publisher) else None
         if complete is None:
             return
-        state, (reference, *feedforward) = complete
-        self._commands.publish(state.stamp, self._pid.step(reference, state.position, self.period, sum(feedforward)))
+        state, (wanted, *feedforward) = complete
+        self._commands.publish(state.stamp, self._law.answer(wanted, state.position, self.period, sum(feedforward)))
         self._answered = state.stamp
         self.deadlines.tick(time.monotonic())
 
