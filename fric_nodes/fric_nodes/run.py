@@ -9,6 +9,7 @@ made, which may take a compilation, a signal breaks that off.
 from __future__ import annotations
 
 import gc
+import re
 import signal
 import sys
 from collections.abc import Callable
@@ -52,7 +53,7 @@ def run(kind: Callable[..., FricNode], args: list[str] | None = None) -> None:
     An input that can't be used is one line, which begins with the node's name, and exit status 2.
     """
     stop = _Stop()
-    name = kind.__name__.removesuffix("Node").lower()
+    name = re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__.removesuffix("Node")).lower()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = kind()

@@ -186,6 +186,7 @@ def test_concealed_bristles_are_named_and_located(presliding: tuple[object, Diag
     assert found.unexplained.share < 0.05
 
 
+@pytest.mark.long
 def test_physics_that_no_effect_describes_is_said_to_be_unknown() -> None:
     case = draw(0, "unknown", "payload_step")
     found = diagnose(case.train, case.validation, case.nominal)

@@ -23,7 +23,8 @@ INSTALLED = Path(sys.prefix) / "lib" / "fric_nodes"
 
 
 def _start(graph: Graph, name: str) -> subprocess.Popen[str]:
-    extra = ["-p", f"bag:={graph.folder / 'bag'}"] if name == "recorder" else []
+    needed = {"recorder": f"bag:={graph.folder / 'bag'}", "hardware_bridge": "serial.port:=/dev/no_such_port"}
+    extra = ["-p", needed[name]] if name in needed else []
     # The installed executables run the installed package; from a source tree the modules stand in for them.
     under_test = Path(fric_nodes.__file__).resolve().is_relative_to(Path(sys.prefix).resolve())
     command = [str(INSTALLED / name)] if under_test else [sys.executable, "-m", f"fric_nodes.nodes.{name}"]
