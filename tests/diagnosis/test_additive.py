@@ -107,5 +107,5 @@ def test_what_is_missing_shows_in_its_component() -> None:
     assert (first.component, first.laws[0].effect) == ("friction-time", "time_drift")
     assert first.is_there
     assert first.laws[0].explained > 0.8
-    assert "friction over time: something is missing (> 99 % sure" in first.sentence("N")
+    assert "N rms goes with friction over time; slow drift of friction" in first.sentence("N")
     assert all(0.0 <= each.presence <= 1.0 and 0.0 <= each.share <= 1.0 for each in found)

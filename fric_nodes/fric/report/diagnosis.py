@@ -229,18 +229,19 @@ def _components_section(found: Diagnosis) -> Section:
             (
                 each.title,
                 each.place,
-                f"{100 * each.presence:.3g} %",
+                f"{significant(each.force, 2)} {unit}",
+                f"{100 * each.share:.2g} %",
                 f"{each.evidence:.1f}",
-                f"{significant(each.force, 2)} {unit}" if each.is_there else "",
                 "" if best is None else best.title,
                 "" if best is None else f"{100 * best.explained:.0f} %",
             )
         )
-    head = ("component", "part of the machine", "something is missing", "evidence [nats]", "force, rms", "best law", "explains")
+    head = ("component", "part of the machine", "force, rms", "share", "evidence [nats]", "best law", "explains")
     note = (
-        "What the grown model still lacks in the recordings learnt from, as a sum of one flexible function per component. "
-        "The evidence compares the sum with and without a component, all others fitted anew. The last column is the share of a "
-        "component's evidence that its best law reaches: where it is small, no law of the vocabulary describes what is missing."
+        "What the grown model still lacks in the recordings learnt from, as a sum of one flexible function per component, all "
+        "fitted together. The share is that of the missing energy that comes back without the component; the evidence compares "
+        "the sum with and without it. The last column is the part of that evidence that the best law reaches; where it is "
+        "small, no law of the vocabulary describes what is missing. Physics that belongs to no component shows in several."
     )
     return Section(
         "What is still missing, by component",

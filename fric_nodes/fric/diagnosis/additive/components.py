@@ -173,6 +173,8 @@ COMPONENTS: tuple[Component, ...] = (
     Component("force-position", "force over position", "load", _over_place),
     Component(COMB, "force that repeats over position", "load", _comb),
     Component("force-time", "force over time", "load", _over_time),
+    Component("inertia-time", "inertia over time", "load", lambda s, r: _over_time(s, r) * s.acceleration[:, None]),
+    Component("inertia-position", "inertia over position", "load", lambda s, r: _over_place(s, r) * s.acceleration[:, None]),
     Component("command", "command path", "command path", _command),
 )
 """The components with functions along the measured motion."""

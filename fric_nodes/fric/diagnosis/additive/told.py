@@ -14,6 +14,7 @@ from .residual import PRESENT, additive
 
 __all__ = ["ComponentFinding", "LawShare", "by_component"]
 
+_REAL_PART = 0.02  # of the missing energy: a seventh of its amplitude; less says nothing about the cause
 _WORTH_NAMING = 0.05  # probability among the laws of a component
 _MOST_LAWS = 3
 
@@ -47,7 +48,8 @@ class ComponentFinding:
         component: its id.
         title: in a sentence.
         place: part of the machine.
-        presence: probability that something is missing there, whatever else is missing elsewhere.
+        presence: probability, by Bayes' rule, that the component's function is needed beside all others. It is no verdict on a
+            cause: physics that belongs to none of the components, and laws at first order, show as several of them.
         evidence: logarithm of the Bayes factor behind that [nats].
         force: root mean square of the force that is missing there [F].
         share: of the missing force's energy that comes back when this component alone is left out, 0 to 1.
@@ -65,19 +67,18 @@ class ComponentFinding:
 
     @property
     def is_there(self) -> bool:
-        """True where something is more likely missing than not."""
-        return self.presence >= PRESENT
+        """True where its function is needed, and makes up a real part of what is missing."""
+        return self.presence >= PRESENT and self.share >= _REAL_PART
 
     def sentence(self, unit: str) -> str:
         """In one sentence; ``unit`` is that of forces."""
-        sure = "> 99" if self.presence > 0.99 else f"{100.0 * self.presence:.0f}"
-        told = f"{self.title}: something is missing ({sure} % sure, {self.force:.2g} {unit} rms)"
+        told = f"of what is left, {self.force:.2g} {unit} rms goes with {self.title}"
         if not self.laws:
             return f"{told}; no law of the vocabulary describes it"
         best = self.laws[0]
         others = [each.title for each in self.laws[1:]]
         beside = f" (or {', '.join(others)})" if others else ""
-        return f"{told}; {best.title}{beside} explains {100.0 * best.explained:.0f} % of its evidence"
+        return f"{told}; {best.title}{beside} explains {100.0 * best.explained:.0f} % of that"
 
     def as_json(self) -> dict[str, object]:
         """For programs."""
