@@ -256,8 +256,7 @@ KNOWN: dict[str, Case] = {
         for what in ("effects", "effects dwell_time", "effects presliding", "plants", "excitations", "methods", "schema")
     },
     "fric verify --out verification.html": _long(7200.0),
-    "fric demo": _long(),
-    "fric demo --clock wall": _long(),
+    **dict.fromkeys(("fric compete", "fric demo", "fric demo --clock wall"), _long(4 * 3600.0)),
     "fric prove --cases 300 --seed 110 --out proof": _long(4 * 3600.0, status=(0, 1)),
     **{
         f"fric bench {name}": _long(4 * 3600.0, status=(0, 1))
