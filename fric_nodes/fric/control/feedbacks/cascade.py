@@ -22,7 +22,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...parameter import Parameter
-from ..controller import Controller, Setpoint
+from ..controller import Controller, Setpoint, check_inputs
 from ..loop import Polynomials, added
 from ..tunable import Basis, Tunable
 
@@ -110,7 +110,8 @@ class Cascade:
         return output
 
     def answer(self, wanted: Setpoint, measured: float, duration: float, feedforward: float = 0.0) -> float:
-        """:meth:`step` towards a setpoint, of which this law takes position and velocity."""
+        """:meth:`step` towards a setpoint, of which it takes position and velocity; a bad input leaves the state as it was."""
+        check_inputs(wanted, measured, duration, feedforward)
         return self.step(wanted.position, wanted.velocity, measured, duration, feedforward)
 
 
