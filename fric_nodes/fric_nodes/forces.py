@@ -65,7 +65,7 @@ class SenderCheck:
 
     def __init__(self, node: LoopNode, on_command: Callable[[Any], None]) -> None:
         self._node = node
-        self._subscription = node.create_subscription(force_type(node), "force_command", on_command, SAMPLES)
+        self._subscription = node.create_subscription(force_type(node), "force_command", on_command, node.input_qos)
         self._watch = SenderWatch()
 
     def alone(self) -> bool:

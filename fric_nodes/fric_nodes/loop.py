@@ -9,11 +9,13 @@ from typing import Any
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from .base import FricNode
 from .convert import JointSample, joint_sample
 from .parameters import NodeParameter
+from .qos import LATEST, SAMPLES
 from .scheduling import use_realtime_scheduling
 from .timing import Deadlines
 
@@ -74,6 +76,11 @@ class LoopNode(FricNode):
         if priority > 0 and not self.lock_step:
             self._scheduling = use_realtime_scheduling(priority)
             self.get_logger().info(f"scheduling: {self._scheduling}")
+
+    @property
+    def input_qos(self) -> QoSProfile:
+        """With which the loop takes samples: every one of them in lock-step, the newest in wall time."""
+        return SAMPLES if self.lock_step else LATEST
 
     def has_audience(self, publisher: Publisher) -> bool:
         """True once as many nodes as asked for listen to ``publisher``, and from then on."""

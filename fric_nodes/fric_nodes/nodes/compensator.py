@@ -21,7 +21,6 @@ from ..lockstep import Answers
 from ..loop import LOCK_STEP, PERIOD, LoopNode
 from ..model_intake import ModelIntake
 from ..parameters import NodeParameter
-from ..qos import SAMPLES
 from ..run import run
 from ..wall_time import REFERENCES, StampClock, reference_guard
 
@@ -71,7 +70,7 @@ class CompensatorNode(LoopNode):
         self._stamps, self._watch = StampClock(self), reference_guard(settings)
         self._watch.counters = self.counters
         self._answers: Answers[ReferencePoint, float] = Answers()
-        self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
+        self.create_subscription(Reference, "reference", self._on_reference, self.input_qos)
 
     def _preview(self) -> float:
         given = self.settings.number("preview")

@@ -71,10 +71,10 @@ class HardwareBridgeNode(LoopNode):
         self._state = JointState(name=[self.joint], position=[0.0])
         self._state.header.frame_id = self.joint
         self._publisher = self.create_publisher(JointState, "joint_states", SAMPLES)
-        self._commands = self.create_subscription(force_type(self), "force_command", self._on_command, SAMPLES)
+        self._commands = self.create_subscription(force_type(self), "force_command", self._on_command, self.input_qos)
         self._wanted = (0, math.nan)
         if math.isfinite(self._layer.limits.following_error):
-            self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
+            self.create_subscription(Reference, "reference", self._on_reference, self.input_qos)
         requests = {"enable": self._layer.enable, "disable": self._layer.disable, "reset_fault": self._layer.reset}
         add_triggers(self, {name: self._at_once(act) for name, act in requests.items()})
         self.create_timer(self.period, self._tick, clock=self.steady)

@@ -27,7 +27,6 @@ from ..lockstep import Matching
 from ..loop import LOCK_STEP, PERIOD, LoopNode
 from ..parameters import NodeParameter
 from ..pid_parameters import CONTROLLER_FILE, GAINS, gains_of, law_of
-from ..qos import SAMPLES
 from ..run import run
 from ..wall_time import REFERENCES, STATES, WallControl
 
@@ -65,10 +64,10 @@ class PidNode(LoopNode):
         self._wall = WallControl(self, self._law)
         self._feedforward = (-math.inf, 0.0)
         self._commands = ForcePublisher(self, "force_command")
-        self.create_subscription(JointState, "joint_states", self._on_state, SAMPLES)
-        self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
+        self.create_subscription(JointState, "joint_states", self._on_state, self.input_qos)
+        self.create_subscription(Reference, "reference", self._on_reference, self.input_qos)
         if self._adds:
-            self.create_subscription(force_type(self), "feedforward_force", self._on_feedforward, SAMPLES)
+            self.create_subscription(force_type(self), "feedforward_force", self._on_feedforward, self.input_qos)
 
     def _on_settings(self, _changed: set[str]) -> None:
         if isinstance(self._law, Pid):  # a file's gains are the file's
