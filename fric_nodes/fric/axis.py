@@ -92,16 +92,27 @@ class SimulatedAxis:
         Raises:
             InputError: ``model`` has another structure.
         """
-        before = self._simulator
-        same = [held.effect for held in model.terms] == [held.effect for held in self._model.terms]
-        simulator = Simulator(model) if same and model.plant is self._plant else None
-        if simulator is None or simulator.friction_state.shape != before.friction_state.shape:
-            raise InputError("model", "has another plant or other terms than the axis", "change values only")
+        before, simulator = self._simulator, self._successor(model)
         simulator.states, simulator.friction_state, simulator.memory = before.states, before.friction_state, before.memory
         simulator.applied, simulator.time = before.applied, before.time
         self._model, self._simulator = model, simulator
         self._plant_values = np.array(model.plant_values, dtype=np.float64)
         self._substeps.clear()
+
+    def accepts(self, model: Model) -> None:
+        """Find out if the axis can go on with ``model``, and leave it as it is.
+
+        Raises:
+            InputError: ``model`` has another structure.
+        """
+        self._successor(model)
+
+    def _successor(self, model: Model) -> Simulator:
+        same = [held.effect for held in model.terms] == [held.effect for held in self._model.terms]
+        simulator = Simulator(model) if same and model.plant is self._plant else None
+        if simulator is None or simulator.friction_state.shape != self._simulator.friction_state.shape:
+            raise InputError("model", "has another plant or other terms than the axis", "change values only")
+        return simulator
 
     def _encoder(self, position: float) -> float:
         """One reading of the encoder at ``position`` [x]."""

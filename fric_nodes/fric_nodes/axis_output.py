@@ -9,7 +9,7 @@ from fric.errors import InputError
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 
-from .axis_parameters import model_in
+from .axis_parameters import model_at, model_in
 from .base import wait_until_sent
 from .convert import set_stamp
 from .forces import ForcePublisher
@@ -82,6 +82,7 @@ class ModelSwitch:
         self._axis = axis
         self._output = output
         self.since = 0
+        node.settings.test_before("model_file", lambda path: axis.accepts(model_at(path)))
         node.settings.when_changed(self._on_settings)
 
     def _on_settings(self, changed: set[str]) -> None:

@@ -11,7 +11,7 @@ from fric.shared_files import config_file
 
 from .parameters import NodeParameter, Settings
 
-__all__ = ["AXIS", "model_in", "simulated_axis"]
+__all__ = ["AXIS", "model_at", "model_in", "simulated_axis"]
 
 AXIS = (
     NodeParameter(
@@ -34,12 +34,20 @@ AXIS = (
 
 
 def model_in(settings: Settings) -> Model:
+    """The model that the parameter ``model_file`` means.
+
+    Raises:
+        InputError: the file can't be used.
+    """
+    return model_at(settings.text("model_file"))
+
+
+def model_at(given: str) -> Model:
     """The model that is meant: of a path, or of a file that comes with fric; empty: of the demo axis.
 
     Raises:
         InputError: the file can't be used.
     """
-    given = settings.text("model_file")
     path = Path(given or "demo_axis.yaml")
     return read_model(config_file(path.name) if not given or (path.name == given and not path.exists()) else path)
 

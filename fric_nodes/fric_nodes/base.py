@@ -12,15 +12,31 @@ from rclpy.duration import Duration
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 
 from .convert import MessageError
 from .parameters import NodeParameter, Settings
+from .qos import chosen_qos, qos_parameter, qos_parameters
+from .qos_watch import QosWatch
 from .timing import Deadlines, Reporter
 
-__all__ = ["FricNode", "wait_until_sent"]
+__all__ = ["Described", "FricNode", "wait_until_sent"]
 
 Message = TypeVar("Message")
 Value = TypeVar("Value")
+
+
+class Described(Exception):
+    """Comes in place of a node that was only to say which parameters it has.
+
+    Attributes:
+        declarations: its parameters.
+    """
+
+    def __init__(self, declarations: Sequence[NodeParameter]) -> None:
+        super().__init__()
+        self.declarations = declarations
 
 
 class FricNode(Node):
@@ -29,6 +45,7 @@ class FricNode(Node):
     Args:
         name: of the node.
         declarations: its parameters.
+        describe: raise :class:`Described` instead of making a node.
         options: ``context``, ``namespace``, ``parameter_overrides`` and the like, as for ``rclpy.node.Node``.
 
     Attributes:
@@ -37,13 +54,18 @@ class FricNode(Node):
         deadlines: periods of the node's main activity; without a nominal period unless the node gives one.
 
     Raises:
-        NodeParameterError: a parameter has a value that can't be used.
+        NodeParameterError: a parameter has a value that can't be used, or is not known.
+        Described: in place of a node, when asked for.
     """
 
-    def __init__(self, name: str, declarations: Sequence[NodeParameter], **options: Any) -> None:
+    def __init__(self, name: str, declarations: Sequence[NodeParameter], *, describe: bool = False, **options: Any) -> None:
+        declarations = (*declarations, *qos_parameters(name))
+        if describe:
+            raise Described(declarations)
         super().__init__(name, **options)
         self.settings = Settings(self, declarations)
         self.counters: Counter[str] = Counter()
+        self._qos_watch = QosWatch(self, self.counters)
         self.deadlines = Deadlines(0.0)
         # Timers count on this clock: the node's own may be simulated, and stand still.
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -87,12 +109,48 @@ class FricNode(Node):
 
     def report_every(self, period: float) -> Reporter:
         """Report on ``/diagnostics`` every ``period`` [s] from now on."""
-        self._reporter = Reporter(self, period, self.deadlines, self.counters, self.verdict, self.condition)
+        self._reporter = Reporter(self, period, self.deadlines, self.counters, self._whole_verdict, self.condition)
         return self._reporter
+
+    def _whole_verdict(self, troubles: Sequence[str]) -> tuple[bytes, str]:
+        """The node's own verdict; an error with its cause where a topic carries nothing."""
+        level, text = self.verdict(troubles)
+        faults = self._qos_watch.faults()
+        return (DiagnosticStatus.ERROR, "; ".join([*faults, text])) if faults else (level, text)
 
     def report(self) -> None:
         """Report now, besides."""
         self._reporter.publish()
+
+    def qos_of(self, topic: str, profile: QoSProfile) -> QoSProfile:
+        """What the parameter ``qos.TOPIC`` asks for; ``profile`` where there is none, or it leaves the choice to the node.
+
+        Args:
+            topic: as the node names it.
+            profile: the node's own choice.
+        """
+        name = qos_parameter(topic)
+        return chosen_qos(self.settings.text(name), profile) if self.has_parameter(name) else profile
+
+    def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **options: Any) -> Publisher:
+        """As in rclpy; with the quality of service that a parameter asks for, and what doesn't go together is reported."""
+        # rclpy makes publishers of its own before there are parameters
+        if isinstance(qos_profile, QoSProfile) and hasattr(self, "_qos_watch"):
+            qos_profile = self.qos_of(topic, qos_profile)
+            options.setdefault("event_callbacks", self._qos_watch.events_of_publisher(topic, qos_profile))
+        return super().create_publisher(msg_type, topic, qos_profile, **options)
+
+    def create_subscription(
+        self, msg_type: Any, topic: str, callback: Callable[[Any], None], qos_profile: Any, **options: Any
+    ) -> Subscription:
+        """As in rclpy; with the quality of service that a parameter asks for, and what doesn't go together is reported."""
+        if isinstance(qos_profile, QoSProfile) and hasattr(self, "_qos_watch"):
+            qos_profile = self.qos_of(topic, qos_profile)
+            if "event_callbacks" in options:
+                self._qos_watch.look_always(topic, qos_profile)
+            else:
+                options["event_callbacks"] = self._qos_watch.events_of_subscription(topic, qos_profile)
+        return super().create_subscription(msg_type, topic, callback, qos_profile, **options)
 
     def refuse(self, what: str, why: object) -> None:
         """Count an input that can't be used, and say so at most once a second."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from .base import FricNode
 from .convert import nanoseconds
 from .qos import SAMPLES
 
@@ -23,11 +23,11 @@ class DriveTopics:
         states: topic of the joint states of ros2_control.
     """
 
-    def __init__(self, node: Node, states: str) -> None:
+    def __init__(self, node: FricNode, states: str) -> None:
         self._node = node
         self._newest: JointState | None = None
         self._publishers: dict[str, Publisher] = {}
-        node.create_subscription(JointState, states, self._on_state, SAMPLES)
+        node.create_subscription(JointState, states, self._on_state, node.qos_of("drive_states", SAMPLES))
 
     def _on_state(self, message: JointState) -> None:
         self._newest = message

@@ -6,6 +6,7 @@ passes.
 
 from __future__ import annotations
 
+import difflib
 import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -22,13 +23,9 @@ from rclpy.parameter import Parameter as RosParameter
 
 __all__ = ["NodeParameter", "NodeParameterError", "Settings", "from_declaration"]
 
-_TYPE_NAMES: Mapping[type, str] = {
-    bool: "bool",
-    int: "integer",
-    float: "double (write a decimal point)",
-    str: "string",
-    list: "array",
-}
+_TYPE_NAMES: Mapping[type, str] = {bool: "bool", int: "integer", float: "double", str: "string", list: "string array"}
+_OF_RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+"""Parameters, or beginnings of their names, that every node of rclpy takes besides its own."""
 
 
 class NodeParameterError(InputError):
@@ -58,6 +55,31 @@ class NodeParameter:
     upper: float = math.inf
     choices: tuple[str, ...] = ()
     settable: bool = False
+
+    @property
+    def type_name(self) -> str:
+        """Name of the type, as ROS has it."""
+        return _TYPE_NAMES[type(self.default)]
+
+    @property
+    def default_text(self) -> str:
+        """The default as it is written on a command line."""
+        if isinstance(self.default, bool):
+            return str(self.default).lower()
+        if isinstance(self.default, list):
+            return f"[{', '.join(each for each in self.default if each)}]"
+        return f"'{self.default}'" if isinstance(self.default, str) else repr(self.default)
+
+    @property
+    def allowed(self) -> str:
+        """The values allowed, in words; empty: any."""
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
+        if self.lower == -math.inf and self.upper == math.inf:
+            return ""
+        if self.upper == math.inf:
+            return f"at least {self.lower:g}"
+        return f"from {self.lower:g} to {self.upper:g}"
 
     def descriptor(self) -> ParameterDescriptor:
         """What the node tells about the parameter."""
@@ -125,13 +147,15 @@ class Settings:
         self._values: dict[str, Any] = {}
         for declaration in self._declarations.values():
             self._values[declaration.name] = self._declared(node, declaration)
+        self._tests: dict[str, Callable[[Any], object]] = {}
+        self._refuse_unknown(node)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._adopt)
 
     @staticmethod
     def _declared(node: Node, declaration: NodeParameter) -> Any:
         where = f"parameter '{declaration.name}' of {node.get_fully_qualified_name()}"
-        wanted = _TYPE_NAMES[type(declaration.default)]
+        wanted = declaration.type_name + (" (write a decimal point)" if isinstance(declaration.default, float) else "")
         try:
             value = node.declare_parameter(declaration.name, declaration.default, declaration.descriptor()).value
         except InvalidParameterTypeException:
@@ -144,10 +168,24 @@ class Settings:
             raise NodeParameterError(where, refusal, declaration.doc)
         return value
 
+    def _refuse_unknown(self, node: Node) -> None:
+        """Refuse what was given under a name that the node doesn't have, which rclpy leaves aside in silence."""
+        for name in node._parameter_overrides:  # rclpy has no public way to ask for them
+            if name in self._declarations or name.startswith(_OF_RCLPY):
+                continue
+            close = difflib.get_close_matches(name, self._declarations, n=1)
+            remedy = f"did you mean '{close[0]}'?" if close else "--help lists the node's parameters"
+            raise NodeParameterError(f"parameter '{name}' of {node.get_fully_qualified_name()}", "is not known", remedy)
+
     def _check(self, changes: list[RosParameter]) -> SetParametersResult:
         for change in changes:
             declaration = self._declarations.get(change.name)
             refusal = declaration.refusal(change.value) if declaration is not None else None
+            if refusal is None and change.name in self._tests:
+                try:
+                    self._tests[change.name](change.value)
+                except InputError as error:
+                    refusal = " ".join(str(error).split())
             if refusal is not None:
                 return SetParametersResult(successful=False, reason=refusal)
         return SetParametersResult(successful=True)
@@ -157,6 +195,10 @@ class Settings:
         self._values.update({change.name: change.value for change in changes if change.name in changed})
         for listener in self._listeners:
             listener(changed)
+
+    def test_before(self, name: str, test: Callable[[Any], object]) -> None:
+        """Let ``test`` look at each new value of ``name`` before it counts; where it raises InputError, it is refused."""
+        self._tests[name] = test
 
     def when_changed(self, listener: Callable[[set[str]], None]) -> None:
         """Call ``listener`` with the names of the parameters that have been set."""

@@ -20,7 +20,8 @@ import rclpy
 from fric.errors import InputError
 from rclpy.signals import SignalHandlerOptions
 
-from .base import FricNode
+from .arguments import check_arguments, help_text
+from .base import Described, FricNode
 
 __all__ = ["run"]
 
@@ -50,11 +51,15 @@ def run(kind: Callable[..., FricNode], args: list[str] | None = None) -> None:
         kind: the node's class.
         args: ROS arguments; those of the process when None.
 
-    An input that can't be used is one line, which begins with the node's name, and exit status 2.
+    An input that can't be used is one line, which begins with the node's name, and exit status 2. ``--help`` lists the
+    parameters.
     """
     stop = _Stop()
     name = re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__.removesuffix("Node")).lower()
     try:
+        if check_arguments(sys.argv if args is None else args):
+            sys.stdout.write(_help(kind, name))
+            return
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = kind()
         stop.made = True
@@ -69,6 +74,15 @@ def run(kind: Callable[..., FricNode], args: list[str] | None = None) -> None:
     finally:
         stop.made = True
         rclpy.try_shutdown()
+
+
+def _help(kind: Callable[..., FricNode], name: str) -> str:
+    try:
+        kind(describe=True)
+    except Described as found:
+        about = " ".join((sys.modules[kind.__module__].__doc__ or "").split("\n\n", maxsplit=1)[0].split())
+        return help_text(name, about.replace("``", ""), found.declarations)
+    raise TypeError(f"{kind.__name__} does not hand its options on to FricNode")
 
 
 def _serve(node: FricNode, stop: _Stop) -> None:

@@ -148,7 +148,7 @@ def test_services(graph: Any, tmp_path: Path) -> None:
     graph.until(lambda: listener.estimates and listener.estimates[-1].samples_used > 1000, "an estimate")
     assert list(listener.estimates[-1].names) == ["mass", "coulomb.force", "viscous.coefficient"]
 
-    assert listener.call(FreezeIdentification, "freeze", freeze=True).success
+    assert listener.call(FreezeIdentification, "freeze").success, "without an argument it freezes"
     frozen = listener.estimates[-1].samples_used
     play(graph, bag)
     assert listener.call(FreezeIdentification, "freeze", freeze=True).success

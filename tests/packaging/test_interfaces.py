@@ -9,7 +9,7 @@ import pytest
 
 INTERFACES = Path(__file__).parents[2] / "fric_interfaces"
 DEFINITIONS = sorted([*INTERFACES.glob("msg/*.msg"), *INTERFACES.glob("srv/*.srv")])
-FIELD = re.compile(r"(?P<type>[\w/\[\]<=]+)\s+(?P<name>\w+)(\s*=\s*\S+)?\s*(#\s*(?P<comment>.*))?$")
+FIELD = re.compile(r"(?P<type>[\w/\[\]<=]+)\s+(?P<name>\w+)(\s*=\s*\S+|\s+(?P<default>[^\s#]\S*))?\s*(#\s*(?P<comment>.*))?$")
 UNIT = re.compile(r"\[[^\]]+\]")
 
 

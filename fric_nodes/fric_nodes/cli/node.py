@@ -30,8 +30,9 @@ def register(app: typer.Typer) -> None:
     app.command(
         "node",
         no_args_is_help=True,
-        context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
-        epilog="Example: fric node plant --ros-args --params-file config/plant.yaml",
+        # What follows the node's name is the node's, --help as well.
+        context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "allow_interspersed_args": False},
+        epilog="Example: fric node plant --ros-args --params-file config/plant.yaml    or: fric node plant --help",
     )(node)
 
 
@@ -39,7 +40,7 @@ def node(
     context: typer.Context,
     name: Annotated[str, typer.Argument(help=f"One of {', '.join(NODES)}.")],
 ) -> None:
-    """Run one ROS 2 node. Arguments after its name go to ROS, such as --ros-args -p name:=value."""
+    """Run one ROS 2 node. Arguments after its name go to it, such as --help, or --ros-args -p name:=value."""
     if name not in NODES:
         raise InputError("fric node", f"no node '{name}'", f"choose one of {', '.join(NODES)}")
     sys.argv = [name, *context.args]
