@@ -13,12 +13,14 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 
-__all__ = ["BulkSubscription", "Taken", "message_class", "offered_qos"]
+__all__ = ["BulkSubscription", "Taken", "message_class", "offered_qos", "stored_qos"]
 
 
 class Taken(NamedTuple):
@@ -129,3 +131,22 @@ def offered_qos(publishers: Iterable[TopicEndpointInfo], depth: int) -> QoSProfi
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
+
+
+def stored_qos(profile: QoSProfile) -> Qos:
+    """``profile`` as bags hold it. Discovery tells neither history nor depth: they are unknown, as in the bags of rosbag2."""
+    return Qos(
+        history=QosHistory[profile.history.name],
+        depth=profile.depth,
+        reliability=QosReliability[profile.reliability.name],
+        durability=QosDurability[profile.durability.name],
+        deadline=_stored_time(profile.deadline),
+        lifespan=_stored_time(profile.lifespan),
+        liveliness=QosLiveliness[profile.liveliness.name],
+        liveliness_lease_duration=_stored_time(profile.liveliness_lease_duration),
+        avoid_ros_namespace_conventions=profile.avoid_ros_namespace_conventions,
+    )
+
+
+def _stored_time(duration: Duration) -> QosTime:
+    return QosTime(*divmod(duration.nanoseconds, 1_000_000_000))

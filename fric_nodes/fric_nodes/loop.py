@@ -29,8 +29,10 @@ COMMON = (
         "realtime_priority", 0, "wall time: SCHED_FIFO priority to ask the system for; 0: normal scheduling", "", 0, 99
     ),
     NodeParameter("wait_for_subscribers", 1, "publish the first sample when so many listen; later ones always", "", 0, 100),
+    NodeParameter("wait_for_nodes", [""], "and when these nodes do, such as recorder, so that it has the start; empty: none"),
     NodeParameter("diagnostics_period", 1.0, "time between two reports on /diagnostics", "s", 0.01, 3600.0),
 )
+_LOOK = 0.02  # physical scale: [s] between two looks at who listens; well below the rest before a motion
 
 
 class LoopNode(FricNode):
@@ -58,6 +60,7 @@ class LoopNode(FricNode):
         self.deadlines = Deadlines(0.0 if self.lock_step else self.period)
         self._scheduling = "normal"
         self._heard = False
+        self._look_again = 0.0  # [s], monotonic
         reporter = self.report_every(self.settings.number("diagnostics_period"))
         reporter.more = lambda: {"scheduling": self._scheduling, **self.condition()}
 
@@ -85,8 +88,24 @@ class LoopNode(FricNode):
     def has_audience(self, publisher: Publisher) -> bool:
         """True once as many nodes as asked for listen to ``publisher``, and from then on."""
         if not self._heard:
-            self._heard = bool(publisher.get_subscription_count() >= self.settings.integer("wait_for_subscribers"))
+            listening = publisher.get_subscription_count()
+            self._heard = listening >= self.settings.integer("wait_for_subscribers") and self._awaited_listen(publisher)
         return self._heard
+
+    def _awaited_listen(self, publisher: Publisher) -> bool:
+        """True once all nodes of the parameter ``wait_for_nodes`` listen to ``publisher``."""
+        names = self.settings.texts("wait_for_nodes")
+        now = time.monotonic()
+        if not names or now < self._look_again:
+            return not names
+        self._look_again = now + _LOOK
+        listening = set()
+        for end in self.get_subscriptions_info_by_topic(publisher.topic_name):
+            listening |= {end.node_name, f"{end.node_namespace.rstrip('/')}/{end.node_name}"}
+        missing = [name for name in names if name not in listening]
+        if missing:
+            self.get_logger().info(f"waiting for {', '.join(missing)}", throttle_duration_sec=5.0)
+        return not missing and publisher.get_subscription_count() >= len(names)
 
     def state_of_joint(self, message: JointState) -> JointSample | None:
         """The joint's part of ``message``; None, and a refusal, when it can't be used."""

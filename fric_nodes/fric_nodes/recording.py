@@ -13,8 +13,9 @@ from fric.bagio.write import BagWriter
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rosbags.interfaces import Qos
 
-from .bulk import BulkSubscription, message_class, offered_qos
+from .bulk import BulkSubscription, message_class, offered_qos, stored_qos
 
 __all__ = ["Recording"]
 
@@ -46,6 +47,7 @@ class Recording:
         self._bulk: list[BulkSubscription] = []
         self._erasers: list[PaddingEraser] = []
         self._refused: set[str] = set()
+        self._known: set[tuple[int, ...]] = set()  # publishers whose offer is in the bag
 
     @property
     def lost(self) -> int:
@@ -76,12 +78,20 @@ class Recording:
                     self._subscribe(topic, publishers)
                 continue
             present = self._bulk[at]
-            qos = offered_qos([p for p in publishers if p.topic_type == present.msgtype], self._depth)
+            publishers = [publisher for publisher in publishers if publisher.topic_type == present.msgtype]
+            self._writer.offer(topic, self._new_offers(publishers))
+            qos = offered_qos(publishers, self._depth)
             if not _receives_as_well(present.qos, qos):
                 # A publisher with less to offer has joined, from which the present subscription would receive nothing.
                 self._take(at)
                 self._bulk[at] = BulkSubscription(self._node, present.msgtype, topic, qos)
                 present.destroy()
+
+    def _new_offers(self, publishers: Sequence[TopicEndpointInfo]) -> list[Qos]:
+        """What those of ``publishers`` offer that were not there before."""
+        new = [publisher for publisher in publishers if tuple(publisher.endpoint_gid) not in self._known]
+        self._known |= {tuple(publisher.endpoint_gid) for publisher in new}
+        return list(dict.fromkeys(stored_qos(publisher.qos_profile) for publisher in new))
 
     def _subscribe(self, topic: str, publishers: Sequence[TopicEndpointInfo]) -> None:
         msgtype = publishers[0].topic_type
@@ -89,8 +99,9 @@ class Recording:
             self._node.get_logger().warning(f"{topic}: published with several types; only {msgtype} is recorded")
         try:
             first = next(iter(message_class(msgtype).get_fields_and_field_types().values()), "")
-            self._writer.topic(topic, msgtype)
-            qos = offered_qos([p for p in publishers if p.topic_type == msgtype], self._depth)
+            publishers = [publisher for publisher in publishers if publisher.topic_type == msgtype]
+            self._writer.topic(topic, msgtype, offered=self._new_offers(publishers))
+            qos = offered_qos(publishers, self._depth)
             self._bulk.append(BulkSubscription(self._node, msgtype, topic, qos))
         except (ImportError, WriteError) as error:
             self._refused.add(topic)

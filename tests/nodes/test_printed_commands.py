@@ -70,9 +70,11 @@ _ON_FILES = {"diagnose", "import", "identify", "compare", "simulate"}  # verbs t
 def _is_name(command: str) -> bool:
     """True when it names a verb, or options of one, without what it works on; or holds a placeholder."""
     words = command.split()
+    if words[0] != "fric":
+        return False
     if words[-1] in {"…", "NAME", "--help"} or command in {"fric verify", "fric prove"}:
         return True
-    return words[0] == "fric" and words[1] in _ON_FILES and (len(words) == 2 or words[2].startswith("--"))
+    return words[1] in _ON_FILES and (len(words) == 2 or words[2].startswith("--"))
 
 
 # What commands need
@@ -233,6 +235,10 @@ KNOWN: dict[str, Case] = {
     "ros2 run fric_nodes player --ros-args -p bag:=bags/slide -p rate:=4.0": Case(node="player"),
     "ros2 run fric_nodes compensator --ros-args --params-file config/compensator.yaml -p model_file:=found/model.yaml": Case(
         (_found,), node="compensator"
+    ),
+    "ros2 run fric_nodes plant --help": Case(),
+    'ros2 run fric_nodes excitation --ros-args --params-file config/excitation.yaml -p "wait_for_nodes:=[recorder]"': Case(
+        node="excitation"
     ),
     **{
         f"ros2 run fric_nodes {name} --ros-args --params-file config/{name}.yaml": Case((_found,), node=name)

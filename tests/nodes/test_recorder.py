@@ -11,12 +11,15 @@ import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from fric.bagio import bag_info, iterate_raw, read_record
+from fric_nodes.nodes.player import PlayerNode
 from fric_nodes.nodes.recorder import RecorderNode
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
+
+from fric_interfaces.msg import Reference
 
 TALKER = str(Path(__file__).with_name("talker.py"))
 
@@ -177,6 +180,65 @@ def test_a_best_effort_publisher_that_joins_a_reliable_one_is_heard(graph: Any, 
 
     graph.until(arrives, "a message of the second publisher")
     under_test.close()
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_what_publishers_offer_is_in_the_bag_and_played_again(graph: Any, tmp_path: Path, storage: str) -> None:
+    bag = tmp_path / "bag"
+    node = graph.node("source")
+    latched = node.create_publisher(String, "friction/model", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+    strict = node.create_publisher(JointState, "joint_states", 10)
+    node.create_publisher(Float64, "friction/mismatch", 10)  # whatever its type: recorded by default
+    under_test = recorder(graph, bag, storage=storage)
+    graph.until(lambda: cycle(under_test) or strict.get_subscription_count() == 1, "the recorder subscribes")
+    loose = node.create_publisher(JointState, "joint_states", QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT))
+    graph.until(lambda: cycle(under_test) or loose.get_subscription_count() == 1, "the recorder subscribes again")
+    graph.until(lambda: cycle(under_test) or latched.get_subscription_count() == 1, "and to the model")
+    strict.publish(JointState(name=["axis"], position=[0.5]))
+    graph.until(lambda: cycle(under_test) or under_test.written["/joint_states"] == 1, "a message")
+    graph.until(lambda: cycle(under_test) or "/friction/mismatch" in under_test.written, "the mismatch")
+    under_test.close()
+    metadata = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    offered = {
+        entry["topic_metadata"]["name"]: [
+            (qos["reliability"], qos["durability"]) for qos in entry["topic_metadata"]["offered_qos_profiles"]
+        ]
+        for entry in metadata["topics_with_message_count"]
+    }
+    assert offered["/friction/model"] == [("reliable", "transient_local")]
+    assert offered["/joint_states"] == [("reliable", "volatile"), ("best_effort", "volatile")]
+    player = graph.owns(PlayerNode(context=graph.context(), parameter_overrides=[Parameter("bag", value=str(bag))]))
+    played = {each.topic_name: (each.qos_profile.reliability, each.qos_profile.durability) for each in player.publishers}
+    assert played["/friction/model"] == (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
+    assert played["/joint_states"] == (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE)
+
+
+@pytest.mark.parametrize("lock_step", [False, True])
+def test_the_recorder_may_be_started_last(graph: Any, tmp_path: Path, lock_step: bool) -> None:
+    """The excitation waits for it, so that the motion is recorded from its start on."""
+    common = {"lock_step": str(lock_step).lower(), "period": 0.002}
+    graph.start_node("plant", duration=2.0 if lock_step else 0.0, **common)
+    graph.start_node("pid", use_feedforward="false", **common)
+    excitation = graph.start_node("excitation", wait_for_nodes="[recorder]", start_delay=0.5, **common)
+    watcher = graph.node("watcher")
+    heard: list[Reference] = []
+    watcher.create_subscription(Reference, "reference", heard.append, 2000)
+    graph.spin(watcher)
+    everyone = {"plant", "pid", "excitation"}
+    graph.until(lambda: everyone <= set(watcher.get_node_names()), "the loop is there")
+    time.sleep(1.0)
+    assert not heard, "it does not begin without the recorder"
+    bag = tmp_path / "bag"
+    process = graph.start_node("recorder", bag=bag)
+    graph.until(lambda: len(heard) > 600, "the motion")
+    excitation.kill()
+    assert graph.finish(process, signal.SIGINT)[0] == 0
+    references = [deserialize_message(raw.data, Reference) for raw in iterate_raw(bag, ["/reference"])]
+    assert len(references) > 500
+    assert abs(references[0].velocity) == 0.0, "the recording begins at rest"
+    if lock_step:
+        assert (references[0].header.stamp.sec, references[0].header.stamp.nanosec) == (0, 0)
+    assert any(abs(each.velocity) > 0.0 for each in references)
 
 
 def test_topics_are_chosen_and_namespaced(graph: Any, tmp_path: Path) -> None:

@@ -13,14 +13,14 @@ import sqlite3
 import struct
 import tempfile
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from io import StringIO
 from pathlib import Path
 from types import TracebackType
 from typing import Literal
 
 import numpy as np
-from rosbags.interfaces import Connection
+from rosbags.interfaces import Connection, ConnectionExtRosbag2, Qos
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer, WriterError
 from rosbags.rosbag2.storage_mcap import McapWriter
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
@@ -103,7 +103,9 @@ class BagWriter:
         """Messages taken so far, by topic."""
         return {name: self._writer.counts[connection.id] for name, connection in self._connections.items()}
 
-    def topic(self, name: str, msgtype: str, msgdef: str | None = None, digest: str | None = None) -> None:
+    def topic(
+        self, name: str, msgtype: str, msgdef: str | None = None, digest: str | None = None, offered: Iterable[Qos] = ()
+    ) -> None:
         """Announce a topic; announcing it again with the same type changes nothing.
 
         Args:
@@ -111,6 +113,7 @@ class BagWriter:
             msgtype: such as ``std_msgs/msg/Float64``.
             msgdef: text of the definition with everything it refers to; looked up when None.
             digest: RIHS01 hash of the type; looked up when None.
+            offered: quality of service that the topic's publishers offer.
 
         Raises:
             WriteError: announced before with another type; or a type whose definition is not known.
@@ -124,7 +127,27 @@ class BagWriter:
             if msgdef is None or digest is None:
                 found = definition(msgtype)
                 msgdef, digest = msgdef or found[0], digest or found[1]
-            self._connections[name] = self._writer.add_connection(name, msgtype, msgdef=msgdef, rihs01=digest)
+            self._connections[name] = self._writer.add_connection(
+                name, msgtype, msgdef=msgdef, rihs01=digest, offered_qos_profiles=list(offered)
+            )
+
+    def offer(self, topic: str, offered: Iterable[Qos]) -> None:
+        """Note what a further publisher of ``topic`` offers, for the metadata that the bag gets in the end.
+
+        Raises:
+            WriteError: topic not announced.
+        """
+        connection = self._announced(topic)
+        with self._lock:
+            ext = connection.ext
+            if isinstance(ext, ConnectionExtRosbag2):
+                ext.offered_qos_profiles.extend(qos for qos in offered if qos not in ext.offered_qos_profiles)
+
+    def _announced(self, topic: str) -> Connection:
+        connection = self._connections.get(topic)
+        if connection is None:
+            raise WriteError(topic, "is not announced", "announce a topic with its type before writing to it")
+        return connection
 
     def write(self, topic: str, log_time_ns: int, data: bytes | memoryview) -> None:
         """Take one message.
@@ -137,9 +160,7 @@ class BagWriter:
         Raises:
             WriteError: topic not announced, bag closed, or the disk refused an earlier message.
         """
-        connection = self._connections.get(topic)
-        if connection is None:
-            raise WriteError(topic, "is not announced", "announce a topic with its type before writing to it")
+        connection = self._announced(topic)
         with self._lock:
             if self._closed:
                 raise WriteError(self.path, "is closed", "open a new bag")

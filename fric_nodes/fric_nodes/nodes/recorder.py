@@ -27,6 +27,7 @@ DEFAULT_TOPICS = (
     "temperature",
     "friction/model",
     "friction/estimate",
+    "friction/mismatch",
     "/diagnostics",  # one for the whole graph, whatever the namespace
 )
 PARAMETERS = (
