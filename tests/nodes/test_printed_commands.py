@@ -25,6 +25,7 @@ import numpy as np
 import pytest
 from fric.bagio.read import read_record
 from fric.bagio.write import write_record
+from fric_nodes.cli.env import variables
 
 if TYPE_CHECKING:
     from .conftest import Graph
@@ -237,6 +238,7 @@ KNOWN: dict[str, Case] = {
         (_found,), node="compensator"
     ),
     "ros2 run fric_nodes plant --help": Case(),
+    'eval "$(fric env)" && ros2 run fric_nodes plant': Case(node="plant"),
     'ros2 run fric_nodes excitation --ros-args --params-file config/excitation.yaml -p "wait_for_nodes:=[recorder]"': Case(
         node="excitation"
     ),
@@ -339,7 +341,9 @@ def place(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def path_of_shell(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The environment's own commands first, then those of the test."""
+    """The environment's own commands first, then those of the test; what ``fric env`` sets, for a real ``ros2``."""
+    for name, value in variables(Path(sys.prefix), os.environ).items():
+        monkeypatch.setenv(name, value)
     monkeypatch.setenv(
         "PATH", os.pathsep.join([str(Path(sys.executable).parent), str(place.parent / "tools"), os.environ["PATH"]])
     )
@@ -385,11 +389,12 @@ def test_it_runs_as_printed(command: str, graph: Graph, place: Path, path_of_she
     for prepare in case.needs:
         prepare(place)
     environment = {**os.environ, "ROS_DOMAIN_ID": str(graph.domain), "ROS_LOG_DIR": str(place / "log")}
-    # A shell gives way to the last command of its line, so that a signal reaches the node itself.
-    process = graph.execute("bash", "-c", f"exec {command}" if case.node else command, cwd=place, env=environment)
+    process = graph.execute("bash", "-c", command, cwd=place, env=environment)
     if case.node:
         _in_the_graph(graph, case.node, process)
-        status, out, error = graph.finish(process, signal.SIGINT) if process.poll() is None else graph.finish(process)
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C in a terminal: ros2 run leaves the signal to the node
+        status, out, error = graph.finish(process)
     else:
         status, out, error = graph.finish(process, limit=case.limit)
     assert status in case.status, f"{command}\n{out}\n{error}"
