@@ -225,7 +225,7 @@ KNOWN: dict[str, Case] = {
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml --out diagnosis": _long(),
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml": _long(),
     "fric diagnose bags/slide --blocks 8 --model config/nominal_model.yaml --out diagnosis": _long(),
-    **dict.fromkeys(("fric --version", "fric doctor", "fric doctor bags/slide"), Case()),
+    **dict.fromkeys(("fric --version", "fric env", "fric doctor", "fric doctor bags/slide"), Case()),
     "fric compare bags/simulated bags/slide --out comparison": Case((_simulated,)),
     "fric model show found/model.yaml": Case((_found,)),
     "fric simulate found/model.yaml --force bags/slide --out bags/simulated": Case((_found,)),
