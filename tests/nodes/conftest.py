@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from typing import Any, TypeVar
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from fric_nodes.cli.env import variables
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
@@ -30,6 +32,7 @@ from rclpy.node import Node
 
 NodeT = TypeVar("NodeT", bound=Node)
 LIMIT = 90.0  # [s] generous: a wait ends when its condition holds, and the machine may be busy
+_ROOT = Path(__file__).resolve().parents[2]
 _ASK_AGAIN = 5.0  # [s]
 _DOMAINS = range(1, 101)  # above that, the ports of DDS fall into those that the system gives away
 
@@ -242,3 +245,31 @@ def quick_switches() -> Iterator[None]:
     sys.setswitchinterval(1e-4)
     yield
     sys.setswitchinterval(usual)
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """A folder like the root of the source tree, with the commands that a shell would find."""
+    folder = tmp_path / "tree"
+    folder.mkdir()
+    for name in ("config", "bags"):
+        shutil.copytree(_ROOT / name, folder / name)
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    if shutil.which("ros2") is None:
+        stand_in = tools / "ros2"
+        stand_in.write_text(
+            '#!/bin/sh\n[ "$1 $2" = "run fric_nodes" ] || exit 3\nshift 2\nexec fric node "$@"\n', encoding="utf-8"
+        )
+        stand_in.chmod(0o755)
+    return folder
+
+
+@pytest.fixture
+def path_of_shell(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The environment's own commands first, then those of the test; what ``fric env`` sets, for a real ``ros2``."""
+    for name, value in variables(Path(sys.prefix), os.environ).items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setenv(
+        "PATH", os.pathsep.join([str(Path(sys.executable).parent), str(place.parent / "tools"), os.environ["PATH"]])
+    )

@@ -13,7 +13,6 @@ import os
 import re
 import shutil
 import signal
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -25,7 +24,6 @@ import numpy as np
 import pytest
 from fric.bagio.read import read_record
 from fric.bagio.write import write_record
-from fric_nodes.cli.env import variables
 
 if TYPE_CHECKING:
     from .conftest import Graph
@@ -319,34 +317,6 @@ def _parameter(command: str) -> object:
     marks += [pytest.mark.long] if case.long else []
     marks += [pytest.mark.real_data] if case.data else []
     return pytest.param(command, marks=marks)
-
-
-@pytest.fixture
-def place(tmp_path: Path) -> Path:
-    """A folder like the root of the source tree, with the commands that a shell would find."""
-    folder = tmp_path / "tree"
-    folder.mkdir()
-    for name in ("config", "bags"):
-        shutil.copytree(ROOT / name, folder / name)
-    tools = tmp_path / "tools"
-    tools.mkdir()
-    if shutil.which("ros2") is None:
-        stand_in = tools / "ros2"
-        stand_in.write_text(
-            '#!/bin/sh\n[ "$1 $2" = "run fric_nodes" ] || exit 3\nshift 2\nexec fric node "$@"\n', encoding="utf-8"
-        )
-        stand_in.chmod(0o755)
-    return folder
-
-
-@pytest.fixture
-def path_of_shell(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The environment's own commands first, then those of the test; what ``fric env`` sets, for a real ``ros2``."""
-    for name, value in variables(Path(sys.prefix), os.environ).items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setenv(
-        "PATH", os.pathsep.join([str(Path(sys.executable).parent), str(place.parent / "tools"), os.environ["PATH"]])
-    )
 
 
 def test_commands_are_found_at_all() -> None:
