@@ -13,6 +13,7 @@ noise down by the root of their number n, and delays the position by (n - 1)/(2 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,7 @@ class SimulatedAxis:
         force_noise: standard deviation of the force signal [F].
         force_limit: largest force of the drive [F], or largest command where the command isn't a force.
         seed: of the noise.
+        position: where it begins, at rest [x].
 
     Attributes:
         saturated: number of intervals in which the drive could not give the force wanted.
@@ -60,11 +62,12 @@ class SimulatedAxis:
         force_noise: float = 0.0,
         force_limit: float = math.inf,
         seed: int = 0,
+        position: float = 0.0,
     ) -> None:
         self._model = model
         self._plant = model.plant
         self._plant_values: Array = np.array(model.plant_values, dtype=np.float64)
-        self._simulator = Simulator(model)
+        self._simulator = Simulator(model, position)
         self._resolution = resolution
         self._position_noise = position_noise
         self._readings = readings
@@ -85,6 +88,10 @@ class SimulatedAxis:
     def position(self) -> float:
         """True position [x]."""
         return self._simulator.position
+
+    def set_states(self, states: Sequence[float]) -> None:
+        """Begin with these states of the plant, of the shape and in the order that it declares."""
+        self._simulator.states[:] = states
 
     def become(self, model: Model) -> None:
         """Go on with other values, from where the axis is and as it moves.

@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 from fric.bench.benchmarks.compensation import figures_of, step_times
-from fric.bench.compensation.axes import AXES
-from fric.bench.compensation.competition import Cell, Outcome, compete, interval, table
-from fric.bench.compensation.methods import METHODS, peak_at_reversals
-from fric.control.trial import Course, sine
+from fric.bench.compensation.catalogue import AXES
+from fric.bench.compensation.competition import Cell, Outcome, compete, interval, rest_figures, table
+from fric.bench.compensation.methods import METHODS, NEEDS_SPRINGS, QUICK, peak_at_reversals
+from fric.bench.compensation.page import competition_page, text_of_gain
+from fric.control.trial import Course, point_to_point, sine
 from fric.errors import InputError
 
 
@@ -39,6 +40,30 @@ def test_a_failure_is_told_and_counts_for_nothing() -> None:
     good, bad = Outcome(1.0, 2.0, 3.0, 0), Outcome(math.nan, math.nan, math.nan, 0, "unstable")
     rows = table([Cell("slide", "pid", (good, good)), Cell("slide", "other", (bad, bad))])
     assert rows[1][2] == "unstable"
+    page = competition_page(
+        [Cell("slide", "pid", (good, good)), Cell("slide", "other", (bad, bad))], "fric compete", 1.0, False
+    )
+    assert "unstable" in page
+
+
+def test_settling_counts_from_the_end_of_a_move() -> None:
+    reference = point_to_point(1e-3, [0.0, 1.0, 0.5], 0.1, 0.4)
+    zero = np.zeros(reference.position.shape[0])
+    error = zero.copy()
+    error[101:151] = 0.2  # 50 samples after the first move
+    error[601:] = 0.2  # the second never settles
+    error[-50:] += 0.1 * np.arange(50)
+    course = Course(reference, reference.position - error, zero, zero, zero, zero, 0, True)
+    settling, unsettled, width = rest_figures(course, 0.1)
+    assert settling == pytest.approx(0.5 * (0.05 + 0.4), abs=2e-3)
+    assert unsettled == 1
+    assert width == pytest.approx(4.9)
+
+
+def test_a_gain_counts_only_beyond_one() -> None:
+    assert text_of_gain((2.0, 1.1, 3.0)) == "2"
+    assert text_of_gain((2.0, 0.9, 3.0)) == "(2)"
+    assert text_of_gain((math.nan,) * 3) == "–"
 
 
 def test_unknown_names_are_refused() -> None:
@@ -77,5 +102,38 @@ def test_models_beat_tables_on_the_slide() -> None:
     assert all(figure.reached for figure in goals), goals
 
 
-def test_every_method_has_a_name_of_its_own() -> None:
-    assert len(METHODS) >= 12
+def test_there_are_twelve_methods_on_five_axes() -> None:
+    assert len(METHODS) - len(NEEDS_SPRINGS) >= 12
+    assert len(AXES) >= 5
+    assert set(QUICK) <= set(METHODS)
+
+
+def test_one_cell_has_every_figure_and_the_page_shows_it() -> None:
+    cells = compete([3], ["cylinder"], ["pid", "tensor product + velocity"])
+    for cell in cells:
+        (found,) = cell.outcomes
+        assert not found.failed
+        assert 0.0 < found.without_lag <= found.rms
+        assert 0.0 < found.share <= 1.0
+        assert found.settling >= 0.0
+        assert found.power > 0.0
+        assert cell.error is not None
+    # Where the PID hunts on the cylinder's stick-slip, the design by linear matrix inequalities rests.
+    assert cells[0].outcomes[0].hunts
+    assert not cells[1].outcomes[0].hunts
+    page = competition_page(cells, "fric compete --axis cylinder", 1.0, True)
+    assert "tensor product + velocity" in page
+    assert "after its friction has changed" in page
+
+
+def test_the_cylinder_gives_the_force_that_is_wanted() -> None:
+    axis = AXES["cylinder"]
+    body = axis.body(axis.drawn(5), 5)
+    body.measure()
+    efforts = []
+    for k in range(1000):
+        body.advance(8.0 * math.sin(2.0 * math.pi * 2.0 * k * 1e-3), 1e-3)
+        efforts.append(body.measure().effort)
+    wanted = 8.0 * np.sin(2.0 * np.pi * 2.0 * 1e-3 * np.arange(1000))
+    assert np.sqrt(np.mean((np.array(efforts) - wanted)[200:] ** 2)) < 2.0
+    assert abs(body.position) < 0.05

@@ -32,7 +32,7 @@ from .trial import follow, point_to_point
 from .tunable import Basis
 from .tuning import tune
 
-__all__ = ["AutotuneError", "Autotuned", "Required", "Timing", "autotune", "plants_around", "resting_width"]
+__all__ = ["AutotuneError", "Autotuned", "Required", "Timing", "autotune", "plants_around", "resting_width", "stuck_stiffness"]
 
 _SLOWER = 1.4  # numerical: factor between two tries of the loop's own time
 _TRIES = 12

@@ -16,16 +16,16 @@ import numpy as np
 from ...axis import SimulatedAxis
 from ...control.autotune import Timing
 from ...control.feedbacks.pid import Pid, PidGains
-from ...control.trial import Course, Reference, follow, point_to_point, sine
+from ...control.trial import Body, Course, Reference, follow
 from ...friction.dnlrx import DnlrxModel
 from ...identification import METHODS
 from ...identification.methods.two_stage import TwoStageIdentification
 from ...identification.result import IdentificationError, Options
 from ...identification.start import start_model
 from ...model import Model, build_model, term
-from ...record import Record, Units
+from ...record import Record
 
-__all__ = ["AXES", "BenchAxis", "Known"]
+__all__ = ["BenchAxis", "Known"]
 
 _SPREAD = 0.2  # physical: of the parameters, as the comparison states
 _HELD_ALIKE = ("exponent", "frequency", "restitution")  # shapes, which aren't drawn
@@ -64,6 +64,11 @@ class BenchAxis:
         task: motion on which methods are compared.
         springs: of the DNLRX; 0: none is identified.
         quick: motion of a second recording, from which the rigid model is identified; None: from the first.
+        rest: moves with rests between, for settling and hunting.
+        tolerance: error of the position at which a move counts as settled [x].
+        lag: share of the delay that lies in the axis itself, such as that of its force controller [s].
+        fixed: parameters that aren't drawn, since a data sheet gives them.
+        made: the axis in motion from its truth and a seed; None: a simulated axis with the sensors above.
     """
 
     id: str
@@ -77,16 +82,26 @@ class BenchAxis:
     force_noise: float = 0.0
     springs: int = 10
     quick: Callable[[float], Reference] | None = field(default=None, repr=False)
+    rest: Callable[[float], Reference] = field(repr=False, kw_only=True)
+    tolerance: float = field(kw_only=True)
+    lag: float = 0.0
+    fixed: tuple[str, ...] = ()
+    made: Callable[[BenchAxis, Model, int], Body] | None = field(default=None, repr=False)
 
     @cached_property
     def reference(self) -> Reference:
         """Of the task."""
         return self.task(self.timing.period)
 
+    @cached_property
+    def resting(self) -> Reference:
+        """Moves with rests."""
+        return self.rest(self.timing.period)
+
     @property
     def delay(self) -> int:
-        """In periods."""
-        return round(self.timing.delay / self.timing.period)
+        """Of the command, in periods."""
+        return round((self.timing.delay - self.lag) / self.timing.period)
 
     def drawn(self, seed: int, only: tuple[str, ...] = (), of: Model | None = None) -> Model:
         """The axis with its parameters drawn; those whose names begin with one of ``only``, where that is given."""
@@ -96,12 +111,15 @@ class BenchAxis:
         for k, parameter in enumerate(model.parameters()):
             factor = random.uniform(1.0 - _SPREAD, 1.0 + _SPREAD)
             shape = parameter.declaration.shape or any(part in parameter.name for part in _HELD_ALIKE)
+            shape = shape or parameter.name in self.fixed
             if not shape and (not only or parameter.name.startswith(only)):
                 values[k] *= factor
         return model.with_values(values)
 
-    def body(self, truth: Model, seed: int) -> SimulatedAxis:
+    def body(self, truth: Model, seed: int) -> Body:
         """The axis with its sensors."""
+        if self.made is not None:
+            return self.made(self, truth, seed)
         return SimulatedAxis(
             truth,
             resolution=self.timing.resolution,
@@ -163,92 +181,6 @@ def record_of(course: Course) -> Record:
         course.seen,
         course.effort,
         reference=course.reference.position,
-        units=Units(),
         source="recording of the comparison",
         effort_hold="preceding",
     )
-
-
-def _graded(largest: float, smallest: float, grades: int, speed: float, move: float) -> Callable[[float], Reference]:
-    """To and fro with amplitudes that fall from ``largest`` to ``smallest`` [x], with inner loops on the way."""
-    points = [0.0]
-    for a in np.geomspace(largest, smallest, grades).tolist():
-        points += [a, -a, -0.4 * a, -0.8 * a, 0.5 * a, 0.1 * a, a, -a]
-    return lambda period: point_to_point(period, [*points, 0.0], move, 0.0, speed)
-
-
-def _quick(amplitude: float, move: float) -> Callable[[float], Reference]:
-    """Thirty moves to and fro, so quick that inertia shows beside friction."""
-    points = [0.0, *(amplitude * (1.0 - 0.02 * k) * (-1.0) ** k for k in range(30)), 0.0]
-    return lambda period: point_to_point(period, points, move, 0.25 * move)
-
-
-_SLIDE = build_model(
-    "rigid",
-    {"mass": 95.0},
-    [
-        term("coulomb", force=20.0),
-        term("stribeck", force=3.0, velocity=4e-3),
-        term("presliding", "gms", stiffness=3e6, attraction=400.0, damping=1200.0),
-        term("viscous", coefficient=205.0),
-        term("bias", force=3.0),
-    ],
-)
-_GUIDEWAY = build_model(
-    "rigid",
-    {"mass": 0.6},
-    [
-        term("coulomb", force=0.6),
-        term("stribeck", force=0.15, velocity=2e-3),
-        term("presliding", "gms", stiffness=6e5, attraction=30.0, damping=60.0),
-        term("viscous", coefficient=2.0),
-        term("actuator_lag", time=1e-4),
-    ],
-)
-_TWO_MASS = build_model(
-    "two_mass",
-    {"motor_mass": 2.0, "load_mass": 5.0, "motor_coulomb": 2.0, "motor_viscous": 10.0},
-    [
-        term("backlash", gap=5e-5),
-        term("coulomb", force=12.0),
-        term("stribeck", force=2.0, velocity=5e-3),
-        term("viscous", coefficient=40.0),
-    ],
-)
-AXES: dict[str, BenchAxis] = {
-    axis.id: axis
-    for axis in (
-        BenchAxis(
-            "slide",
-            "slide of the size of EMPS, 1 kHz, encoder of 0.1 um, one sample of delay",
-            _SLIDE,
-            Timing(1e-3, 1e-3, 1e-7, 200.0),
-            _graded(0.05, 3e-6, 8, 0.12, 0.1),
-            lambda period: sine(period, 0.02, 0.5, 6.0),
-            force_noise=0.2,
-        ),
-        BenchAxis(
-            "guideway",
-            "guideway in pre-sliding, 6.25 kHz, interferometer of 0.1 nm with noise, 370 nm at 1 Hz",
-            _GUIDEWAY,
-            Timing(1.6e-4, 0.0, 1e-10, 10.0),
-            _graded(3e-5, 3e-8, 7, 2e-4, 0.08),
-            lambda period: sine(period, 3.7e-7, 1.0, 3.0),
-            readings=4,
-            position_noise=1e-10,
-            force_noise=2e-4,
-            quick=_quick(5e-4, 0.03),
-        ),
-        BenchAxis(
-            "two_mass",
-            "motor and load with 50 um of backlash, 1 kHz, encoder of 1 um at the motor",
-            _TWO_MASS,
-            Timing(1e-3, 0.0, 1e-6, 150.0),
-            _graded(0.05, 2e-3, 6, 0.12, 0.15),
-            lambda period: sine(period, 0.02, 0.5, 6.0),
-            force_noise=0.2,
-            springs=0,
-        ),
-    )
-}
-"""Every axis by its id."""

@@ -18,13 +18,14 @@ from ...control.feedforwards.dnlrx import DnlrxForce
 from ...control.feedforwards.iterative_learning import IterativeLearning, learnt
 from ...control.feedforwards.quadrant_pulse import QuadrantPulse
 from ...control.feedforwards.static_table import StaticTable
-from ...control.shaping import Shaped, Shaping
-from ...control.trial import Course, follow
+from ...control.shaping import Shaped, Shaping, Total
+from ...control.tensor_product.tuning import TunedTensorProduct, tuned_tensor_product
+from ...control.trial import Course, Reference, follow
 from ...model import Model
 from ...record import Array
 from .axes import BenchAxis, Known
 
-__all__ = ["METHODS", "Bench", "Method", "peak_at_reversals"]
+__all__ = ["METHODS", "NEEDS_SPRINGS", "QUICK", "Bench", "Method", "Setup", "peak_at_reversals"]
 
 _PAIRS = 20  # physical: of a commercial table
 _PASSES = 8  # physical: of iterative learning
@@ -61,6 +62,7 @@ class Bench:
 
     def __post_init__(self) -> None:
         self._tuned: dict[str, Autotuned] = {}
+        self._tensor_product: TunedTensorProduct | None = None
 
     @property
     def preview(self) -> float:
@@ -77,14 +79,27 @@ class Bench:
             )
         return self._tuned[feedback]
 
+    def tensor_product(self) -> TunedTensorProduct:
+        """The design by linear matrix inequalities, once for all methods with it."""
+        if self._tensor_product is None:
+            fastest = max(float(np.max(np.abs(each.velocity))) for each in (self.axis.reference, self.axis.resting))
+            self._tensor_product = tuned_tensor_product(
+                self.known.rigid, self.axis.timing, fastest=fastest, sticking=self.known.presliding
+            )
+        return self._tensor_product
+
     def law(self, feedback: str, **changed: float) -> Law:
         """A feedback at work."""
+        if feedback == "tensor_product":
+            made = self.tensor_product()
+            return made.controller.build({**made.values, **changed}, self.axis.timing.force_limit)
         gains = {**self.tuned(feedback).gains, **changed}
         return CONTROLLERS[feedback].build(gains, self.axis.timing.force_limit)
 
-    def run(self, law: Law, force: Force | None) -> Course:
-        """Once along the task."""
-        return follow(self.axis.body(self.truth, self.seed + 1000), law, self.axis.reference, force, self.axis.delay)
+    def run(self, law: Law, force: Force | None, reference: Reference | None = None) -> Course:
+        """Once along the task, or another reference."""
+        along = self.axis.reference if reference is None else reference
+        return follow(self.axis.body(self.truth, self.seed + 1000), law, along, force, self.axis.delay)
 
     def model_force(self, model: Model, terms: tuple[str, ...] = (), build_up: float = 0.0) -> Force:
         """A model along the reference."""
@@ -102,8 +117,23 @@ class Bench:
         return float(coulomb / max(self.tuned("pid").gains["proportional"], 1e-300))
 
 
-Method = Callable[[Bench], Course]
-"""Gives the course of the task."""
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """A method made ready for one axis; each call gives a law or force at its start.
+
+    Attributes:
+        law: the feedback.
+        force: feedforward along the task.
+        elsewhere: feedforward along other motions; None: the same.
+    """
+
+    law: Callable[[], Law]
+    force: Callable[[], Force | None]
+    elsewhere: Callable[[], Force | None] | None = None
+
+
+Method = Callable[[Bench], Setup]
+"""Tunes and learns what it needs on the axis, and gives what then goes to work."""
 
 
 def _velocity_only(bench: Bench) -> Force:
@@ -119,27 +149,34 @@ def _table(bench: Bench) -> Force:
     return StaticTable(v.tolist(), f.tolist(), rigid.total_inertia, bench.preview)
 
 
-def _pulse(bench: Bench) -> Course:
+def _pulse(bench: Bench) -> Setup:
     """Height and decay by trial on the axis itself, for the smallest peak, as a circle test tunes them."""
     rigid = bench.known.rigid
     coulomb, first = rigid.value("coulomb.force"), bench.axis.reference.position.shape[0] // 2
-    best: tuple[float, Course] | None = None
+    best: tuple[float, Callable[[], Force]] | None = None
     half = 0.5 / _main_frequency(bench.axis.reference.velocity, bench.axis.timing.period)
+
+    def law() -> Law:
+        return bench.law("pid")
+
     for height, decay in itertools.product((0.5, 1.0, 1.5, 2.0), (0.005 * half, 0.02 * half, 0.1 * half, 0.4 * half)):
-        force = QuadrantPulse(
-            height * coulomb,
-            bench.axis.timing.period,
-            decay,
-            viscous=rigid.value("viscous.coefficient"),
-            mass=rigid.total_inertia,
-            preview=bench.preview,
-        )
-        course = bench.run(bench.law("pid"), force)
-        peak = peak_at_reversals(course, first)
+
+        def force(height: float = height, decay: float = decay) -> Force:
+            return QuadrantPulse(
+                height * coulomb,
+                bench.axis.timing.period,
+                decay,
+                viscous=rigid.value("viscous.coefficient"),
+                mass=rigid.total_inertia,
+                preview=bench.preview,
+            )
+
+        course = bench.run(law(), force())
+        peak = peak_at_reversals(course, first) if course.stable else math.inf
         if best is None or peak < best[0]:
-            best = peak, course
+            best = peak, force
     assert best is not None
-    return best[1]
+    return Setup(law, best[1])
 
 
 def _main_frequency(velocity: Array, period: float) -> float:
@@ -148,51 +185,43 @@ def _main_frequency(velocity: Array, period: float) -> float:
     return float(max(0.5 * turns / (velocity.shape[0] * period), 1e-9))
 
 
-def _learning(bench: Bench) -> Course:
+def _learning(bench: Bench) -> Setup:
     """PID with the rigid model, and a force that is learnt in the passes before."""
     period, rigid = bench.axis.timing.period, bench.known.rigid
     gains = bench.tuned("pid").gains
     cutoff = 0.1 / (period + bench.axis.timing.delay)  # numerical: below it the nominal loop's inverse is known well
     damping = rigid.value("viscous.coefficient")
     times, force = bench.axis.reference.time, np.zeros(bench.axis.reference.position.shape[0])
-    best: tuple[float, Course] | None = None
+    best: tuple[float, list[float]] | None = None
+
+    def law() -> Law:
+        return bench.law("pid")
+
+    def learnt_so_far(values: list[float]) -> Force:
+        return Total((_velocity_only(bench), IterativeLearning(times.tolist(), values)))
+
     for _ in range(_PASSES):
-        course = bench.run(bench.law("pid"), _Sum(_velocity_only(bench), IterativeLearning(times.tolist(), force.tolist())))
+        course = bench.run(law(), learnt_so_far(force.tolist()))
         error = bench.axis.reference.position - course.seen
         size = float(np.sqrt(np.mean(error**2)))
         if not course.stable or (best is not None and size > 1.05 * best[0]):
             break
         if best is None or size < best[0]:
-            best = size, course
+            best = size, force.tolist()
         rate = np.gradient(error, period)
         integral = period * np.cumsum(error)
         inverse = rigid.total_inertia * np.gradient(rate, period) + (damping + gains["derivative"]) * rate
         inverse += gains["proportional"] * error + gains["integral"] * integral
-        early = 1 + bench.axis.delay  # a force of sample k shows in the position from k + 1 + delay on
+        early = 1 + round(bench.axis.timing.delay / period)  # a force of sample k shows in the position from k + early on
         correction = _SHARE * np.concatenate([inverse[early:], np.full(early, inverse[-1])])
         force = learnt(force, error, correction, period, cutoff)
-    assert best is not None
-    return best[1]
-
-
-class _Sum:
-    """Two forces together."""
-
-    friction = 0.0
-
-    def __init__(self, *parts: Force) -> None:
-        self._parts = parts
-
-    def reset(self) -> None:
-        for part in self._parts:
-            part.reset()
-
-    def step(self, time: float, position: float, velocity: float, acceleration: float) -> float:
-        return sum(part.step(time, position, velocity, acceleration) for part in self._parts)
+    values = best[1] if best is not None else np.zeros(times.shape[0]).tolist()
+    # What is learnt holds for the motion on which it was learnt.
+    return Setup(law, lambda: learnt_so_far(values), lambda: _velocity_only(bench))
 
 
 def _with(feedback: str, force: Callable[[Bench], Force | None] = lambda _: None, **changed: float) -> Method:
-    return lambda bench: bench.run(bench.law(feedback, **changed), force(bench))
+    return lambda bench: Setup(lambda: bench.law(feedback, **changed), lambda: force(bench))
 
 
 def _dnlrx(bench: Bench) -> Force | None:
@@ -231,9 +260,17 @@ METHODS: dict[str, Method] = {
     "disturbance observer + velocity": _with("disturbance_observer", _velocity_only),
     "friction observer + velocity": _with("friction_observer", _velocity_only),
     "adaptive": _with("adaptive"),
+    "tensor product + velocity": _with("tensor_product", _velocity_only),
+    "tensor product + rigid model, eased": _with("tensor_product", _eased),
     "iterative learning": _learning,
 }
 """Every method by its name. ``+ velocity`` adds viscous friction, bias and inertia along the reference, but no dry friction."""
 
 NEEDS_SPRINGS = ("pid + pre-sliding model", "pid + dnlrx", "nonlinear pid + dnlrx")
 """Methods that are left out where no pre-sliding is identified."""
+
+QUICK = (
+    *("pid", "pid + velocity", "pid + table", "pid + rigid model, eased", "pid + pre-sliding model", "cascade + velocity"),
+    *("disturbance observer + velocity", "friction observer + velocity", "adaptive", "tensor product + velocity"),
+)
+"""Methods of a quick comparison: one of each family."""

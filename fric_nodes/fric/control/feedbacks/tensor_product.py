@@ -17,11 +17,12 @@ from pathlib import Path
 
 from ...parameter import Parameter
 from ..controller import Controller, Law
+from ..tensor_product.design import TensorProductController
 from ..tensor_product.design_file import read_tp_controller
 from ..tensor_product.law import TensorProductLaw
 from ..tensor_product.quasi_lpv import TensorProductControlError
 
-__all__ = ["CONTROLLER"]
+__all__ = ["CONTROLLER", "designed_by"]
 
 
 def _without_design(values: Mapping[str, float], limit: float) -> Law:
@@ -33,6 +34,11 @@ def _designed(path: Path) -> Controller:
     if "force" in design.states or design.input_unit != "F":
         problem = "the design feeds back the force of the actuator, and only the position is read here"
         raise TensorProductControlError(path, problem, "design it for a mass on friction, or use TensorProductLaw.step")
+    return designed_by(design)
+
+
+def designed_by(design: TensorProductController) -> Controller:
+    """The kind of controller that holds ``design``, which feeds back position and velocity alone."""
     return replace(CONTROLLER, build=lambda values, limit: TensorProductLaw(design, limit, **values), units=design.units)
 
 
