@@ -14,9 +14,13 @@ and the residual is above ``noise`` (dead zone). Otherwise everything is frozen,
 wind up. P is bounded by its start. theta is projected onto 0 <= F_C <= ``most_coulomb``, 0 <= F_v <= ``most_viscous``, |b| <=
 ``most_coulomb``.
 
-What is compensated, F = F_C s(w) + F_v w + b + c_m J a along the reference's velocity w, follows theta through a lag of
-``smoothing``, so that a change makes no bump. s(w) is w/(|w| + v_s), or, where ``stiffness`` s0 is given, the force of bristles
-of that level, which builds up over F_C/s0 after a reversal. The output of the law is limited as a whole.
+Where the identified friction is larger near standstill, by the share r of F_C below the velocity v_S, its curve counts as a
+whole: sgn(v) stands for sgn(v) (1 + r exp(-(v/v_S)^2)), and F_C scales all of it.
+
+What is compensated, F = F_C s(w) + F_v w + b + c_m J a along the reference's velocity w, foretold by ``preview``, follows theta
+through a lag of ``smoothing``, so that a change makes no bump. s(w) is the same curve over w/(|w| + v_s), or, where
+``stiffness`` s0 is given, the force of bristles of that level with the damping s1, which builds up over F_C/s0 after a
+reversal. The output of the law is limited as a whole.
 Source: Astrom and Wittenmark 1995, Adaptive Control, sections 2.2 and 11.5 (dead zone, projection, conditional updating);
 Canudas de Wit, Astrom, Braun 1987 (adaptive friction compensation).
 """
@@ -38,6 +42,7 @@ from ..controller import Controller, Setpoint, check_inputs
 from ..loop import Polynomials, pid_polynomials
 from ..tunable import Basis, Tunable
 from .disturbance_observer import Filtered
+from .friction_observer import Bristles
 from .pid import Pid, PidGains
 
 __all__ = ["CONTROLLER", "Adaptation", "Adaptive"]
@@ -85,6 +90,10 @@ class Adaptation:
         most_viscous: bound of F_v [F s/x].
         smoothing: of the compensation [s].
         stiffness: s0 of the bristles of what is compensated [F/x]; 0: a smooth sign.
+        bristle_damping: s1 of them [F s/x].
+        stribeck_share: r, of F_C, by which friction is larger near standstill [1].
+        stribeck_velocity: v_S [x/s].
+        preview: how much later than its stamp a command acts [s].
         coulomb: F_C at the start [F].
         viscous: F_v at the start [F s/x].
         bias: b at the start [F].
@@ -100,6 +109,10 @@ class Adaptation:
     most_viscous: float
     smoothing: float
     stiffness: float = 0.0
+    bristle_damping: float = 0.0
+    stribeck_share: float = 0.0
+    stribeck_velocity: float = 1.0
+    preview: float = 0.0
     coulomb: float = 0.0
     viscous: float = 0.0
     bias: float = 0.0
@@ -154,30 +167,39 @@ class Adaptive:
         self._last = self._moving = self._bent = 0.0
         self._begun = False
 
+    def _curve(self, velocity: float) -> float:
+        """Friction level over F_C at a velocity [1]."""
+        start = self.adaptation
+        return 1.0 + start.stribeck_share * math.exp(-((velocity / start.stribeck_velocity) ** 2))
+
     def _compensation(self, velocity: float, duration: float) -> float:
         start = self.adaptation
         level = float(self.used[0])
         if start.stiffness > 0.0 and level > 0.0:
             # Bristles of the learnt level, led on exactly along the reference.
-            share = math.exp(-start.stiffness * abs(velocity) / level * duration)
-            end = math.copysign(level / start.stiffness, velocity)
-            self._bent = min(max(end + (self._bent - end) * share, -abs(end)), abs(end))
-            dry = start.stiffness * self._bent
+            surplus = (1.0 + start.stribeck_share) * level
+            bristles = Bristles(level, surplus, start.stribeck_velocity, start.stiffness, start.bristle_damping)
+            if duration > 0.0:
+                self._bent, dry = bristles.led(self._bent, velocity, 0.0, duration)
+            else:
+                dry = start.stiffness * self._bent
         else:
-            dry = level * velocity / (abs(velocity) + 0.1 * start.slow) if velocity != 0.0 else 0.0
+            dry = level * self._curve(velocity) * velocity / (abs(velocity) + 0.1 * start.slow) if velocity != 0.0 else 0.0
         return dry + float(self.used[1]) * velocity + float(self.used[2])
 
     def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
         """Start in motion, see :meth:`fric.control.controller.Law.begin`; what was learnt stays."""
         error, rate = wanted.position - state[0], wanted.velocity - state[1]
-        # Sliding for long where it moves; the first step brings it to its level.
-        self._bent = math.copysign(1e9, wanted.velocity) if wanted.velocity != 0.0 else 0.0
-        extra = self._compensation(wanted.velocity, 0.0)
+        start, ahead = self.adaptation, wanted.velocity + self.adaptation.preview * wanted.acceleration
+        # Sliding for long where it moves.
+        level = float(self.used[0]) * self._curve(ahead)
+        self._bent = math.copysign(level / start.stiffness, ahead) if ahead != 0.0 and start.stiffness > 0.0 else 0.0
+        extra = self._compensation(ahead, 0.0)
         self.pid.begin(wanted, state, force - extra, duration)
         self._error.reset(error - duration * rate, rate)
         self._way.reset(state[0] - duration * state[1], state[1])
         self._force.reset(force)
-        self._sign.reset(math.copysign(1.0, state[1]) if state[1] != 0.0 else 0.0)
+        self._sign.reset(math.copysign(self._curve(state[1]), state[1]) if state[1] != 0.0 else 0.0)
         self._last, self._moving, self._begun = force, 0.0, True
 
     def answer(self, wanted: Setpoint, measured: float, duration: float, feedforward: float = 0.0) -> float:
@@ -196,7 +218,8 @@ class Adaptive:
         self.used += share * (self.theta - self.used)
         known = feedforward + self.adaptation.inertia_share * self.adaptation.inertia * wanted.acceleration
         before = self.pid.saturated
-        output = self.pid.step(wanted.position, measured, duration, known + self._compensation(wanted.velocity, duration))
+        ahead = wanted.velocity + self.adaptation.preview * wanted.acceleration
+        output = self.pid.step(wanted.position, measured, duration, known + self._compensation(ahead, duration))
         if self.pid.saturated != before:
             self._moving = 0.0
         self._last = output - known
@@ -210,7 +233,7 @@ class Adaptive:
         self._force.take(self._last, duration)
         speed = self._way.rate
         self._moving = self._moving + duration if abs(speed) > start.slow else 0.0
-        self._sign.take(math.copysign(1.0, speed) if abs(speed) > start.slow else 0.0, duration)
+        self._sign.take(math.copysign(self._curve(speed), speed) if abs(speed) > start.slow else 0.0, duration)
         if self._moving < _SETTLED * start.observer_time:
             return
         target = self._force.value + start.inertia * self._error.bend
@@ -244,18 +267,29 @@ def _start_of(model: Model) -> dict[str, float]:
         "bias": held.get("bias.force", 0.0),
         "most_coulomb": 5.0 * coulomb,
         "most_viscous": 5.0 * viscous,
+        "stribeck_share": max(held.get("stribeck.force", 0.0), 0.0) / coulomb if coulomb > 0.0 else 0.0,
+        "stribeck_velocity": held.get("stribeck.velocity", 1.0),
+        "bristle_damping": held.get("presliding.damping", 0.0),
     }
 
 
 def _gains(basis: Basis) -> dict[str, float]:
     time = 1.0 / basis.crossover
     start = _start_of(basis.model)
-    # Slow is what the filter can't tell from standing: two steps of the encoder in its time, or a tenth of what the loop's
+    # Slow is what the filter can't tell from standing: two steps of the encoder in its time, or four tenths of what the loop's
     # bandwidth makes of the error at which the proportional part overcomes friction.
-    slow = max(2.0 * basis.resolution / time, 0.1 * basis.crossover * basis.coulomb / max(basis.pid["proportional"], 1e-300))
+    slow = max(2.0 * basis.resolution / time, 0.4 * basis.crossover * basis.coulomb / max(basis.pid["proportional"], 1e-300))
     integral = basis.pid["integral"] * 0.25**basis.calm
-    own = {"inertia_share": 1.0, "observer_time": time, "memory": 2.0, "slow": slow, "noise": 0.02 * basis.coulomb}
-    return {**basis.pid, **start, **own, "integral": integral, "smoothing": 0.1, "stiffness": basis.stuck}
+    own = {"inertia_share": 1.0, "observer_time": time, "memory": 1.0, "slow": slow, "noise": 0.02 * basis.coulomb}
+    return {
+        **basis.pid,
+        **start,
+        **own,
+        "integral": integral,
+        "smoothing": 0.1,
+        "stiffness": basis.stuck,
+        "preview": basis.plant.delay + 0.5 * basis.plant.period,
+    }
 
 
 def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
@@ -274,7 +308,7 @@ CONTROLLER = Controller(
         Parameter("inertia", "J", "F s^2/x", "nominal inertia", positive=True),
         Parameter("inertia_share", "c_m", "1", "share of the inertia force that this law feeds forward", 0.0, 1.0, default=1.0),
         Parameter("observer_time", "T_q", "s", "time constant of the filter before the identification", positive=True),
-        Parameter("memory", "T", "s", "time over which motion counts", positive=True, default=2.0),
+        Parameter("memory", "T", "s", "time over which motion counts", positive=True, default=1.0),
         Parameter("slow", "v_d", "x/s", "filtered speed below which nothing is learnt", positive=True),
         Parameter("noise", "d_d", "F", "residual below which nothing is learnt", lower=0.0, default=0.0),
         Parameter("most_coulomb", "F_max", "F", "bound of Coulomb force and bias", lower=0.0),
@@ -283,6 +317,12 @@ CONTROLLER = Controller(
         Parameter(
             "stiffness", "s0", "F/x", "stiffness of the compensation's bristles; 0: a smooth sign", lower=0.0, default=0.0
         ),
+        Parameter("bristle_damping", "s1", "F s/x", "damping of these bristles", lower=0.0, default=0.0),
+        Parameter(
+            "stribeck_share", "r", "1", "share of F_C by which friction is larger near standstill", lower=0.0, default=0.0
+        ),
+        Parameter("stribeck_velocity", "v_S", "x/s", "velocity over which that falls", positive=True, default=1.0),
+        Parameter("preview", "T_a", "s", "how much later than its stamp a command acts", lower=0.0, default=0.0),
         Parameter("coulomb", "F_C", "F", "Coulomb force at the start", lower=0.0, default=0.0),
         Parameter("viscous", "F_v", "F s/x", "viscous coefficient at the start", lower=0.0, default=0.0),
         Parameter("bias", "b", "F", "constant force at the start", default=0.0),
