@@ -133,7 +133,9 @@ def point_to_point(
     return Reference(period, whole[0], whole[1], whole[2])
 
 
-def follow(body: Body, law: Law, reference: Reference, forward: Force | None = None, delay: int = 0) -> Course:
+def follow(
+    body: Body, law: Law, reference: Reference, forward: Force | None = None, delay: int = 0, age: float = 0.0
+) -> Course:
     """Lead ``body`` along ``reference``.
 
     Args:
@@ -142,10 +144,16 @@ def follow(body: Body, law: Law, reference: Reference, forward: Force | None = N
         reference: what is wanted.
         forward: feedforward, already with the preview that the delay asks for.
         delay: of the command, in samples.
+        age: of a reading when it is reported, such as that of a mean of several; the law compares it with what was wanted
+            then [s].
     """
     n, h = reference.position.shape[0], reference.period
     position, seen, force, effort, ahead = (np.zeros(n) for _ in range(5))
     wanted = np.stack([reference.position, reference.velocity, reference.acceleration], axis=1).tolist()
+    then = wanted
+    if age > 0.0:
+        r, v, a = reference.position, reference.velocity, reference.acceleration
+        then = np.stack([r - age * (v - 0.5 * age * a), v - age * a, a], axis=1).tolist()
     late: deque[float] = deque([0.0] * delay)
     # The first motion of a reference at 0 may be of any size: its own range is the scale.
     far = _FAR * max(float(np.ptp(reference.position)), 1e-12)
@@ -160,7 +168,7 @@ def follow(body: Body, law: Law, reference: Reference, forward: Force | None = N
         now = wanted[k]
         if forward is not None:
             ahead[k] = forward.step(k * h, *now)
-        force[k] = law.answer(Setpoint(*now), said.position, h, float(ahead[k]))
+        force[k] = law.answer(Setpoint(*then[k]), said.position, h, float(ahead[k]))
         late.append(float(force[k]))
         body.advance(late.popleft(), h)
     return Course(reference, position, seen, force, effort, ahead, law.saturated, stable)

@@ -25,12 +25,13 @@ from ..axis import Measurement
 from ..engine.kernel import kernel, local_array, loop
 from ..record import Array, Record
 
-__all__ = ["SAMPLE_TIME", "Guideway", "graded_strokes", "recorded", "wandering"]
+__all__ = ["READING_AGE", "SAMPLE_TIME", "Guideway", "graded_strokes", "recorded", "wandering"]
 
 SAMPLE_TIME = 1.6e-4  # [s] of the controller and of the recording
 ELEMENTS = 150
 _FINE = 10
 _READINGS, _BETWEEN = 4, 3  # interferometer at 25 kHz, and steps between two of its readings
+READING_AGE = 0.5 * (_READINGS - 1) / _READINGS * SAMPLE_TIME  # [s], of the mean of those in a period
 _MASS, _VISCOUS, _LAG = 0.6, 2.0, 1e-4  # [kg], [N s/m], [s]
 _COULOMB, _STATIC, _STRIBECK = 0.6, 0.75, 2e-3  # [N], [N], [m/s]
 _STIFFNESS, _ATTRACTION, _BRISTLE_DAMPING = 6e5, 30.0, 60.0  # [N/m], [N/s], [N s/m]

@@ -103,6 +103,11 @@ class BenchAxis:
         """Of the command, in periods."""
         return round((self.timing.delay - self.lag) / self.timing.period)
 
+    @property
+    def age(self) -> float:
+        """Of a reading that is the mean of several, when it is reported [s]."""
+        return 0.5 * (self.readings - 1) / self.readings * self.timing.period
+
     def drawn(self, seed: int, only: tuple[str, ...] = (), of: Model | None = None) -> Model:
         """The axis with its parameters drawn; those whose names begin with one of ``only``, where that is given."""
         random = np.random.default_rng(seed)

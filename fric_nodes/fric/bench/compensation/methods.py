@@ -99,7 +99,7 @@ class Bench:
     def run(self, law: Law, force: Force | None, reference: Reference | None = None) -> Course:
         """Once along the task, or another reference."""
         along = self.axis.reference if reference is None else reference
-        return follow(self.axis.body(self.truth, self.seed + 1000), law, along, force, self.axis.delay)
+        return follow(self.axis.body(self.truth, self.seed + 1000), law, along, force, self.axis.delay, self.axis.age)
 
     def model_force(self, model: Model, terms: tuple[str, ...] = (), build_up: float = 0.0) -> Force:
         """A model along the reference."""
