@@ -77,7 +77,7 @@ class Required:
 
     gain: float = 2.0
     phase: float = 30.0
-    delay: float = 1.0
+    delay: float = 2.0
     share: float = 0.95
     sensitivity: float = 1.7
 

@@ -125,7 +125,7 @@ def _run_all() -> Evidence:
         "the slide then stays within its pre-sliding stiffness, and the hundredfold is reached against every such PID. The "
         "PID with the most integral action that M_s = 1.7 allows follows to 25 nm RMS by itself: there the factor is some 70.",
         "A reading is the mean of four and 60 us old when it is reported: the controller compares it with what was wanted "
-        "then. Compared with what is wanted now, the error over a millimetre is 27 nm RMS, nearly all of it speed times that age.",
+        "then. Compared with what is wanted now, the error over a millimetre is 27 nm RMS, nearly all of it speed times age.",
     ]
     caption = "As the paper's Figs. 10 and 11; above, a PID that can't follow, below, the tightest PID beside the feedforward."
     return Evidence(figures, [(plot, caption)], notes)

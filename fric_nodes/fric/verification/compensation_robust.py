@@ -87,6 +87,19 @@ def _over_compensated() -> list[Figure]:
     return figures
 
 
+def _unexpected() -> list[Figure]:
+    """The same on a loop that autotuning was told nothing of: two samples of delay and an encoder ten times as coarse."""
+    wrong, told = _axis(_TOO_LARGE), Timing(_TIMING.period, 0.0, 0.1 * _TIMING.resolution, _TIMING.force_limit)
+    figures = []
+    for name in _KINDS:
+        kind = CONTROLLERS[name]
+        gains = autotune(wrong, kind, told, draws=30).gains
+        force = None if name in ("friction_observer", "adaptive") else _ahead(wrong)
+        figures.append(Figure(f"the same, delay and encoder not known to autotuning, {name}", _resting(kind, gains, force),
+                              "steps", f"<= {_CYCLE:g}"))  # fmt: skip
+    return figures
+
+
 def _to_and_fro(duration: float) -> Reference:
     """A sine of 20 mm at 0.5 Hz that begins and ends at rest at 0."""
     period = _TIMING.period
@@ -198,7 +211,7 @@ def _picture() -> tuple[go.Figure, str]:
 
 
 def _run() -> Evidence:
-    figures = _over_compensated()
+    figures = [*_over_compensated(), *_unexpected()]
     figures += _learnt("friction doubled", _axis(), _axis(2.0))
     figures += _learnt("friction halved", _axis(), _axis(0.5))
     figures += _learnt("more friction in one direction, then in the other", _axis(bias=8.0), _axis(bias=-8.0))

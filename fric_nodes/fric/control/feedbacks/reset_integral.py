@@ -9,6 +9,9 @@ what makes an axis with friction hunt. A factor near 1 leaves a part of the hunt
 an encoder that can't show a smaller error gives none that could be integrated. Passing zero counts once the error has left the
 dead zone on the other side, so that the encoder's flicker is no passing.
 
+Resets that follow each other within ``dwell`` don't count (temporal regularisation): a loop that swings faster than that, by a
+delay or an encoder that nobody told of, is led by its linear part, whose margins hold, and not stirred at every swing.
+
 A constant force beside friction (gravity) is in the integral too, and a reset takes it away: give it as feedforward.
 Source: Clegg 1958; Beerens, Bisoffi, Zaccarian, Heemels, Nijmeijer, van de Wouw 2019, Automatica 107.
 """
@@ -36,6 +39,7 @@ class ResetIntegral:
         dead_zone: error within which the integral is held [x].
         slow: v_r, speed of the reference up to which the integral is reset [x/s].
         limit: largest output [F].
+        dwell: shortest time between two resets [s].
 
     Attributes:
         saturated: number of samples at which the limit took something away.
@@ -43,11 +47,17 @@ class ResetIntegral:
     """
 
     def __init__(
-        self, gains: PidGains, reset_factor: float = 0.0, dead_zone: float = 0.0, slow: float = 0.0, limit: float = math.inf
+        self,
+        gains: PidGains,
+        reset_factor: float = 0.0,
+        dead_zone: float = 0.0,
+        slow: float = 0.0,
+        limit: float = math.inf,
+        dwell: float = 0.0,
     ) -> None:
         self.gains = gains
         self.limit = limit
-        self._factor, self._dead_zone, self._slow = reset_factor, dead_zone, slow
+        self._factor, self._dead_zone, self._slow, self._dwell = reset_factor, dead_zone, slow, dwell
         self.saturated = self.resets = 0
         self.reset()
 
@@ -55,7 +65,7 @@ class ResetIntegral:
         """Start anew, at rest."""
         self._integral = self._derivative = 0.0
         self._before: float | None = None
-        self._side = 0.0
+        self._side, self._since = 0.0, math.inf
 
     def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
         """Start in motion, see :meth:`fric.control.controller.Law.begin`."""
@@ -63,7 +73,7 @@ class ResetIntegral:
         error, rate = wanted.position - state[0], wanted.velocity - state[1]
         self._before, self._derivative = error - duration * rate, gains.derivative * rate
         self._integral = force - gains.proportional * error - self._derivative if gains.integral > 0.0 else 0.0
-        self._side = 0.0
+        self._side, self._since = 0.0, math.inf
 
     def answer(self, wanted: Setpoint, measured: float, duration: float, feedforward: float = 0.0) -> float:
         """See :meth:`fric.control.controller.Law.answer`.
@@ -76,11 +86,14 @@ class ResetIntegral:
         error = wanted.position - measured
         before = error if self._before is None else self._before
         self._before = error
+        self._since += duration
         if abs(error) > self._dead_zone:
             side = math.copysign(1.0, error)
             if side * self._side < 0.0 and abs(wanted.velocity) <= self._slow:
-                self._integral *= self._factor
-                self.resets += 1
+                if self._since >= self._dwell:
+                    self._integral *= self._factor
+                    self.resets += 1
+                self._since = 0.0
             self._side = side
             self._integral += gains.integral * duration * error
         filtered = gains.filter_time * self._derivative + gains.derivative * (error - before)
@@ -97,14 +110,16 @@ class ResetIntegral:
 
 def _build(given: dict[str, float], limit: float) -> ResetIntegral:
     gains = PidGains(given["proportional"], given["integral"], given["derivative"], given["filter_time"])
-    return ResetIntegral(gains, given["reset_factor"], given["dead_zone"], given["slow"], limit)
+    return ResetIntegral(gains, given["reset_factor"], given["dead_zone"], given["slow"], limit, given["dwell"])
 
+
+_PERIODS = 2.0 * math.pi  # physical: a swing of the loop at its margins takes so many times 1/crossover, or less
 
 _PID = ("proportional", "integral", "derivative", "filter_time")
 
 
 def _gains(basis: Basis) -> dict[str, float]:
-    return {**basis.pid, "reset_factor": 0.0, "dead_zone": basis.dead_zone, "slow": 0.0}
+    return {**basis.pid, "reset_factor": 0.0, "dead_zone": basis.dead_zone, "slow": 0.0, "dwell": _PERIODS / basis.crossover}
 
 
 def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
@@ -123,6 +138,7 @@ CONTROLLER = Controller(
         Parameter("reset_factor", "r", "1", "what the integral is multiplied by at a reset", 0.0, 1.0, default=0.0),
         Parameter("dead_zone", "e_d", "x", "error within which the integral is held", lower=0.0, default=0.0),
         Parameter("slow", "v_r", "x/s", "speed of the reference up to which it is reset", lower=0.0, default=0.0),
+        Parameter("dwell", "T_d", "s", "shortest time between two resets", lower=0.0, default=0.0),
     ),
     build=lambda values, limit: _build(dict(values), limit),
     source="Clegg 1958; Beerens et al. 2019, Automatica 107",
