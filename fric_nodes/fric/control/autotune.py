@@ -3,13 +3,12 @@
 1. :func:`fric.control.tuning.tune` gives the PID with the most integral action at a sensitivity, for the identified mass and
    damping and the timing of the loop; the controller makes its own gains from that (:mod:`fric.control.tunable`).
 2. Plants are drawn from the intervals of mass and damping (normal with their standard errors, or uniform within ``spread``
-where
-   there are none) and every linear form of the controller is tested on each: stable on all, margins kept on 95 % of them, on
-   the free mass. On the mass that sticks to its pre-sliding spring it has to be stable. Otherwise the loop is made slower, by
-   a delay that it is tuned to bear, and step 1 is taken again.
+   where there are none) and every linear form of the controller is tested on each: stable on all, margins kept on 95 % of
+   them, on the free mass. On the mass that sticks to its pre-sliding spring it has to be stable. Otherwise the loop is made
+   slower, by a delay that it is tuned to bear, and step 1 is taken again.
 3. The loop comes to rest under simulation against the identified friction. Where the axis goes on moving by more than three
-steps
-   of the encoder, the controller is asked for calmer gains, three times at most; what is left is reported.
+   steps of the encoder, or harmonic balance (:mod:`fric.control.describing_function`) foretells that it does, the controller is
+   asked for calmer gains, three times at most; what is left is reported.
 
 Margins hold for linear loops: between them stands the friction, which adds damping on average, and a spring in pre-sliding.
 """
@@ -27,6 +26,7 @@ from ..axis import SimulatedAxis
 from ..errors import InputError
 from ..model import Model
 from .controller import Controller
+from .describing_function import LimitCycle, limit_cycles
 from .loop import LinearPlant, LoopMargins, margins
 from .trial import follow, point_to_point
 from .tunable import Basis
@@ -102,7 +102,8 @@ class Autotuned:
         kept: share of the plants drawn that keep the margins [1].
         stable: share of them that are stable [1].
         width: of the motion that goes on at rest in simulation [x].
-        cycles: whether that is a limit cycle.
+        cycles: whether that is a limit cycle, or one is foretold.
+        foretold: limit cycles in which the axis would end, by harmonic balance.
         notes: what a user should know.
     """
 
@@ -113,6 +114,7 @@ class Autotuned:
     stable: float
     width: float
     cycles: bool
+    foretold: tuple[LimitCycle, ...] = ()
     notes: tuple[str, ...] = field(default=())
 
 
@@ -286,13 +288,47 @@ def _calmed(
             found = other
         width = resting_width(model, found.controller, found.gains, timing)
         cycles = width > _CYCLE * max(timing.resolution, 1e-12 * abs(width)) and width > 0.0
+        foretold = foretold_cycles(model, found.controller, found.gains, timing, 2.0 * math.pi * found.nominal.crossover)
         notes = () if number == 0 else (f"calmer gains ({number}) since the axis hunted",)
         if cycles:
             notes = (*notes, f"hunts at rest by {width:.3g} in simulation")
-        found = replace(found, width=width, cycles=cycles, notes=notes)
+        if foretold:
+            at = f"{2.0 * foretold[0].amplitude:.3g} at {foretold[0].frequency:.3g} Hz"
+            notes = (*notes, f"harmonic balance foretells a limit cycle of {at}")
+        cycles = cycles or bool(foretold)
+        found = replace(found, width=width, cycles=cycles, foretold=foretold, notes=notes)
         if not cycles or not calm:
             break
     return found
+
+
+def foretold_cycles(
+    model: Model, controller: Controller, gains: Mapping[str, float], timing: Timing, crossover: float
+) -> tuple[LimitCycle, ...]:
+    """Limit cycles by harmonic balance in which the axis would end, from an encoder step and a half of amplitude on.
+
+    Args:
+        model: the axis.
+        controller: kind of controller.
+        gains: of it.
+        timing: of the loop.
+        crossover: of the loop [rad/s].
+    """
+    largest = _way(model, timing)
+    smallest = max(0.5 * _CYCLE * timing.resolution, 1e-4 * largest)
+    if not 0.0 < smallest < largest or crossover <= 0.0:
+        return ()
+    found = limit_cycles(
+        model, lambda: controller.build(gains, timing.force_limit), timing.period, delay=timing.delay,
+        resolution=timing.resolution, smallest=smallest, largest=largest, crossover=crossover,
+    )  # fmt: skip
+    return tuple(each for each in found if each.stable)
+
+
+def _way(model: Model, timing: Timing) -> float:
+    """A move after which the axis is to rest [x]: hundreds of encoder steps, and of what friction moves in a sample."""
+    coulomb = next((p.value for p in model.parameters() if p.name == "coulomb.force"), 0.0)
+    return max(300.0 * timing.resolution, 20.0 * coulomb * timing.period**2 / model.total_inertia * 100.0)
 
 
 def resting_width(model: Model, controller: Controller, gains: Mapping[str, float], timing: Timing, rest: float = 0.0) -> float:
@@ -306,8 +342,7 @@ def resting_width(model: Model, controller: Controller, gains: Mapping[str, floa
         rest: how long it rests [s]; 0: a thousand time constants of the loop's own time, 4,000 samples at least.
     """
     law = controller.build(gains, timing.force_limit)
-    coulomb = next((p.value for p in model.parameters() if p.name == "coulomb.force"), 0.0)
-    way = max(300.0 * timing.resolution, 20.0 * coulomb * timing.period**2 / model.total_inertia * 100.0)
+    way = _way(model, timing)
     rest = rest if rest > 0.0 else 6000 * timing.period
     move = 400 * timing.period
     reference = point_to_point(timing.period, [0.0, way, 0.37 * way], move, rest)
