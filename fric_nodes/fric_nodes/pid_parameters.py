@@ -9,7 +9,7 @@ from fric.errors import InputError
 
 from .parameters import NodeParameter, Settings
 
-__all__ = ["CONTROLLER_FILE", "GAINS", "gains_of", "law_of"]
+__all__ = ["CONTROLLER_FILE", "GAINS", "gains_of", "law_of", "same_period"]
 
 _SAME = 1e-6  # numerical: relative difference of two periods that are meant to be one
 CONTROLLER_FILE = NodeParameter(
@@ -41,18 +41,29 @@ def gains_of(settings: Settings) -> PidGains:
     )  # fmt: skip
 
 
+def same_period(path: str, given: float, period: float) -> None:
+    """Refuse a file that is for another period [s] than this node's.
+
+    Raises:
+        InputError: it is.
+    """
+    if abs(given - period) > _SAME * period:
+        raise InputError(path, f"is for a period of {given:g} s, this node's is {period:g} s", "give both the same")
+
+
 def law_of(settings: Settings, period: float) -> Law:
     """The law that answers joint states every ``period`` [s].
 
     Raises:
-        InputError: a gain can't be used; or the controller file, or it is for another period, or names a feedforward.
+        InputError: a gain can't be used; or the controller file, or it is for another period, or names a feedforward
+            that nobody would add.
     """
     path, limit = settings.text(CONTROLLER_FILE.name), settings.number("force_limit")
     if not path:
         return Pid(gains_of(settings), limit)
     found = read_controller(path)
-    if abs(found.period - period) > _SAME * period:
-        raise InputError(path, f"is for a period of {found.period:g} s, this node's is {period:g} s", "give both the same")
-    if found.feedforward is not None:
-        raise InputError(path, "names a feedforward, which this node doesn't compute", "leave it to the node compensator")
+    same_period(path, found.period, period)
+    if found.feedforward is not None and not settings.flag("use_feedforward"):
+        problem = "names a feedforward, which the node compensator computes, and use_feedforward is false"
+        raise InputError(path, problem, "give the file to both nodes and set use_feedforward")
     return found.kind.build(found.gains, min(limit, found.force_limit))

@@ -7,6 +7,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
+from fric.errors import InputError
 from fric.model import Model, build_model, term
 from fric.model_file import write_model
 from fric_nodes.convert import model_to_message, set_stamp
@@ -146,3 +148,61 @@ def test_references_of_another_time_and_absurd_ones_leave_nothing_behind(graph: 
 
     graph.until(lambda: refused() == 4, "four refusals")
     assert np.allclose(bench.send(30), 3.0)
+
+
+FILE = """
+format: fric-controller/1
+units: {position: m, force: N}
+period: 0.01
+controller: {type: pid, proportional: 100.0}
+feedforward: {type: static_table, file: table.txt}
+"""
+
+
+def _file(graph: Graph, text: str = FILE) -> str:
+    (graph.folder / "table.txt").write_text("0.0 4.0\n2.0 8.0\n", encoding="utf-8")
+    path = graph.folder / "controller.yaml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def test_any_feedforward_of_a_file_scaled_limited_and_shared(graph: Graph) -> None:
+    bench = Bench(graph, controller_file=_file(graph), scale=0.5)
+    friction: list[float] = []
+    bench.node.create_subscription(Float64, "feedforward_friction", lambda m: friction.append(m.data), 1000)
+    graph.until(lambda: bench.compensator.count_subscribers("feedforward_friction") > 0, "the friction's listener")
+    # 6 N of the table at 1 m/s, half of it.
+    assert np.allclose(bench.send(5), 3.0)
+    graph.until(lambda: len(friction) >= 5, "the share of friction")
+    assert np.allclose(friction, 3.0)
+    values = [Parameter("scale", value=1.0), Parameter("force_limit", value=5.0), Parameter("slew_limit", value=20.0)]
+    request = SetParameters.Request(parameters=[each.to_parameter_msg() for each in values])
+    assert all(each.successful for each in bench.call(SetParameters, "compensator/set_parameters", request).results)
+    forces = bench.send(30)
+    # No more than 0.2 N in 10 ms, and no more than 5 N.
+    assert np.max(np.abs(np.diff([3.0, *forces]))) <= 0.2 + 1e-4  # stamps are in nanoseconds
+    assert forces[-1] == 5.0
+    # A model isn't taken while the file's feedforward is in use.
+    write_model(_model(8.0), graph.folder / "new.yaml")
+    answer = bench.call(LoadModel, "compensator/load_model", LoadModel.Request(path=str(graph.folder / "new.yaml")))
+    assert not answer.success
+    assert "is in use" in answer.message
+
+
+@pytest.mark.parametrize(
+    ("change", "given", "message"),
+    [
+        (("period: 0.01", "period: 0.002"), {}, "is for a period of 0.002 s"),
+        (("feedforward: {type: static_table, file: table.txt}", ""), {}, "names no feedforward"),
+        (("", ""), {"model_file": "model.yaml"}, "has a model_file and a controller_file"),
+        (("file: table.txt", "file: table.txt, scale: 1.5"), {}, "scale is 1.5"),
+    ],
+)
+def test_a_file_that_does_not_fit_is_refused(
+    graph: Graph, change: tuple[str, str], given: dict[str, str], message: str
+) -> None:
+    path = _file(graph, FILE.replace(*change) if change[0] else FILE)
+    values = {"period": H, "controller_file": path, **given}
+    overrides = [Parameter(key, value=value) for key, value in values.items()]
+    with pytest.raises(InputError, match=message):
+        graph.owns(CompensatorNode(context=graph.context(), parameter_overrides=overrides))

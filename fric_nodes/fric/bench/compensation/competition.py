@@ -133,8 +133,8 @@ def _outcome(bench: Bench, name: str) -> tuple[Outcome, Array | None]:
             return failed("unstable", course.saturated), None
         elsewhere = setup.force if setup.elsewhere is None else setup.elsewhere
         resting = bench.run(setup.law(), elsewhere(), axis.resting)
-    except InputError as error:
-        return failed(error.problem), None
+    except InputError as why:
+        return failed(why.problem), None
     half = course.reference.position.shape[0] // 2
     error, velocity, force = course.error[half:], course.reference.velocity[half:], course.force[half:]
     lag = float(error @ velocity / (velocity @ velocity))
@@ -194,9 +194,9 @@ def compete(
             truth = axis.drawn(seed)
             try:
                 known = axis.identified(*axis.recorded(truth, seed))
-            except IdentificationError as error:
+            except IdentificationError as why:
                 for name in chosen:
-                    found.setdefault((axis_id, name), []).append(failed(f"not identified: {error.problem}"))
+                    found.setdefault((axis_id, name), []).append(failed(f"not identified: {why.problem}"))
                 continue
             at_work = axis.drawn(seed + 500_000, _AGED, truth) if aged else truth
             bench = Bench(axis, at_work, seed, known)

@@ -142,8 +142,7 @@ def tuned_tensor_product(
 def _calmed(model: Model, timing: Timing, made: TensorProductController, filter_time: float) -> TunedTensorProduct:
     """The controller with a tolerance at which it rests in simulation."""
     kind = designed_by(made)
-    tolerance, notes = 2.0 * timing.resolution, ()
-    values = {"filter_time": filter_time, "tolerance": tolerance, "velocity_weight": 1.0}
+    values = {"filter_time": filter_time, "tolerance": 2.0 * timing.resolution, "velocity_weight": 1.0}
     found = TunedTensorProduct(kind, values, made, math.nan)
     for number in range(_CALMER + 1):
         width = resting_width(model, kind, found.values, timing)
