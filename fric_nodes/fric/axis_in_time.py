@@ -26,6 +26,11 @@ class TimedDrive:
         self._force = 0.0
         self._fed = False
 
+    @property
+    def force(self) -> float:
+        """Force given now [F]."""
+        return self._force
+
     def advance_to(self, now: int) -> bool:
         """Move the axis to ``now`` [ns] under the force that the drive has been giving; True when the watchdog ended it."""
         end_of_force = self._commanded + self._watchdog

@@ -17,7 +17,7 @@ from rclpy.subscription import Subscription
 
 from .convert import MessageError
 from .parameters import NodeParameter, Settings
-from .qos import chosen_qos, qos_parameter, qos_parameters
+from .qos import as_text, chosen_qos, qos_parameter, qos_parameters
 from .qos_watch import QosWatch
 from .timing import Deadlines, Reporter
 
@@ -25,6 +25,7 @@ __all__ = ["Described", "FricNode", "wait_until_sent"]
 
 Message = TypeVar("Message")
 Value = TypeVar("Value")
+_OF_RCLPY = ("/parameter_events ", "/rosout ")
 
 
 class Described(Exception):
@@ -85,6 +86,10 @@ class FricNode(Node):
         """What the node adds to its report."""
         return {}
 
+    def summary(self) -> str:
+        """What the node works with, for the line in the log at its start."""
+        return ""
+
     def verdict(self, troubles: Sequence[str]) -> tuple[bytes, str]:
         """Level and text of the report; ``troubles`` are the refusals and missed deadlines since the last one."""
         return DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK, ", ".join(troubles) or "running"
@@ -117,6 +122,14 @@ class FricNode(Node):
         level, text = self.verdict(troubles)
         faults = self._qos_watch.faults()
         return (DiagnosticStatus.ERROR, "; ".join([*faults, text])) if faults else (level, text)
+
+    def introduce(self) -> None:
+        """One line in the log: what the node works with, and its topics with their quality of service."""
+        ends: list[tuple[str, Sequence[Publisher | Subscription]]]
+        ends = [("in", list(self.subscriptions)), ("out", list(self.publishers))]
+        topics = [f"{end.topic_name} {way} ({as_text(end.qos_profile)})" for way, each in ends for end in each]
+        told = [topic for topic in topics if not topic.startswith(_OF_RCLPY)]
+        self.get_logger().info("; ".join(part for part in (self.summary(), f"topics: {', '.join(told)}") if part))
 
     def report(self) -> None:
         """Report now, besides."""

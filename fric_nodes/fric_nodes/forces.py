@@ -7,11 +7,9 @@ In wall time a force is a ``std_msgs/Float64``; in lock-step, or where a node is
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from fric.control.reference import ReferencePoint
-from fric.control.safety.senders import SenderWatch
 from std_msgs.msg import Float64
 
 from fric_interfaces.msg import Reference, StampedForce
@@ -21,7 +19,7 @@ from .loop import LoopNode
 from .parameters import NodeParameter
 from .qos import SAMPLES
 
-__all__ = ["STAMPED", "ForcePublisher", "SenderCheck", "force_in", "force_type", "reference_in"]
+__all__ = ["STAMPED", "ForcePublisher", "force_in", "force_or_nan", "force_type", "reference_in"]
 
 STAMPED = NodeParameter("stamped", False, "wall time: use StampedForce instead of Float64 for forces; lock-step always does")
 
@@ -50,34 +48,17 @@ def force_in(message: StampedForce | Float64) -> tuple[int, float]:
     return stamp, force
 
 
+def force_or_nan(message: StampedForce | Float64) -> tuple[int, float]:
+    """As :func:`force_in`, for a safety layer, which refuses what is not finite and knows what it was."""
+    try:
+        return force_in(message)
+    except MessageError:
+        return -1, math.nan
+
+
 def force_type(node: LoopNode) -> Any:
     """The message type of the forces that ``node`` takes and gives."""
     return StampedForce if node.lock_step or node.settings.flag(STAMPED.name) else Float64
-
-
-class SenderCheck:
-    """Takes ``force_command``, and says when more than one publisher is at work there.
-
-    Args:
-        node: counts and says what is refused.
-        on_command: takes the messages.
-    """
-
-    def __init__(self, node: LoopNode, on_command: Callable[[Any], None]) -> None:
-        self._node = node
-        self._subscription = node.create_subscription(force_type(node), "force_command", on_command, node.input_qos)
-        self._watch = SenderWatch()
-
-    def alone(self) -> bool:
-        """A command has come; True when it may be used."""
-        self._watch.command()
-        if self._watch.many:
-            self._node.refuse("command: second source", "more than one publisher commands; the drive gives no force")
-        return not self._watch.many
-
-    def sample(self) -> None:
-        """A sample is over."""
-        self._watch.sample(self._subscription.get_publisher_count())
 
 
 class ForcePublisher:

@@ -85,6 +85,17 @@ class LoopNode(FricNode):
         """With which the loop takes samples: every one of them in lock-step, the newest in wall time."""
         return SAMPLES if self.lock_step else LATEST
 
+    def start_anew(self) -> None:
+        """Forget who has listened so far, and how well deadlines were kept."""
+        self._heard = False
+        self.deadlines.skip()
+
+    def summary(self) -> str:
+        """Joint and clock; what else the node works with comes after it."""
+        clock = "lock-step" if self.lock_step else "wall time"
+        period = f", period {self.period:g} s, {clock}" if self.period > 0.0 else ""
+        return f"joint {self.joint}{period}"
+
     def has_audience(self, publisher: Publisher) -> bool:
         """True once as many nodes as asked for listen to ``publisher``, and from then on."""
         if not self._heard:

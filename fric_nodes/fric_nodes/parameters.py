@@ -143,8 +143,9 @@ class Settings:
 
     def __init__(self, node: Node, declarations: Iterable[NodeParameter]) -> None:
         self._declarations = {declaration.name: declaration for declaration in declarations}
-        self._listeners: list[Callable[[set[str]], None]] = []
+        self._listeners: tuple[Callable[[set[str]], None], ...] = ()
         self._values: dict[str, Any] = {}
+        self._whole_tests: tuple[Callable[[Mapping[str, Any]], object], ...] = ()
         for declaration in self._declarations.values():
             self._values[declaration.name] = self._declared(node, declaration)
         self._tests: dict[str, Callable[[Any], object]] = {}
@@ -188,6 +189,14 @@ class Settings:
                     refusal = " ".join(str(error).split())
             if refusal is not None:
                 return SetParametersResult(successful=False, reason=refusal)
+        return self._check_together({**self._values, **{change.name: change.value for change in changes}})
+
+    def _check_together(self, values: Mapping[str, Any]) -> SetParametersResult:
+        try:
+            for test in self._whole_tests:
+                test(values)
+        except InputError as error:
+            return SetParametersResult(successful=False, reason=" ".join(str(error).split()))
         return SetParametersResult(successful=True)
 
     def _adopt(self, changes: list[RosParameter]) -> None:
@@ -202,7 +211,28 @@ class Settings:
 
     def when_changed(self, listener: Callable[[set[str]], None]) -> None:
         """Call ``listener`` with the names of the parameters that have been set."""
-        self._listeners.append(listener)
+        self._listeners += (listener,)
+
+    def __contains__(self, name: str) -> bool:
+        """True when the node has the parameter ``name``."""
+        return name in self._declarations
+
+    @property
+    def listeners(self) -> tuple[tuple[Any, ...], ...]:
+        """Who is told of changes and asked about them; set it to what it was to forget those that came since."""
+        return self._listeners, self._whole_tests
+
+    @listeners.setter
+    def listeners(self, kept: tuple[tuple[Any, ...], ...]) -> None:
+        self._listeners, self._whole_tests = kept
+
+    def values(self) -> Mapping[str, Any]:
+        """All values by name."""
+        return dict(self._values)
+
+    def test_together(self, test: Callable[[Mapping[str, Any]], object]) -> None:
+        """Let ``test`` look at all values, by name, before a change counts; where it raises InputError, it is refused."""
+        self._whole_tests += (test,)
 
     def number(self, name: str) -> float:
         """Value of a parameter of type double."""

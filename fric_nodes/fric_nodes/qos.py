@@ -21,7 +21,17 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from .parameters import NodeParameter
 
-__all__ = ["DIAGNOSTICS", "LATEST", "MODEL", "SAMPLES", "SAMPLE_TOPICS", "chosen_qos", "qos_parameter", "qos_parameters"]
+__all__ = [
+    "DIAGNOSTICS",
+    "LATEST",
+    "MODEL",
+    "SAMPLES",
+    "SAMPLE_TOPICS",
+    "as_text",
+    "chosen_qos",
+    "qos_parameter",
+    "qos_parameters",
+]
 
 SAMPLES = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=2000, reliability=ReliabilityPolicy.RELIABLE)
 """``joint_states``, ``reference``, ``feedforward_force``, ``force_command``."""
@@ -85,3 +95,9 @@ def chosen_qos(chosen: str, profile: QoSProfile) -> QoSProfile:
     return QoSProfile(
         history=profile.history, depth=profile.depth, reliability=_RELIABILITY[chosen], durability=profile.durability
     )
+
+
+def as_text(qos: QoSProfile) -> str:
+    """Reliability and depth, and durability where it is more than the usual, in words."""
+    kept = ", transient local" if qos.durability is DurabilityPolicy.TRANSIENT_LOCAL else ""
+    return f"{qos.reliability.name.lower().replace('_', ' ')}, depth {qos.depth}{kept}"

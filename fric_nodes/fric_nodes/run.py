@@ -93,6 +93,7 @@ def _serve(node: FricNode, stop: _Stop) -> None:
         ending.callback(node.close)
         executor.add_node(node)
         node.begin()
+        node.introduce()
         # What was imported stays: without this, the first full collection looks at all of it and takes 100 ms and more.
         gc.collect()
         gc.freeze()

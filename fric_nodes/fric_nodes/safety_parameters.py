@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from fric.control.safety import Limits
 
 from .parameters import NodeParameter, Settings
 
-__all__ = ["SAFETY", "limits_of"]
+__all__ = ["ENABLED", "RESUME", "SAFETY", "limits_of", "safety_parameters"]
 
 _NONE = 1e12  # physical scale: far above what an axis may have; stands for no limit, since a parameter can't be infinite
 SAFETY = (
@@ -36,21 +37,42 @@ SAFETY = (
     NodeParameter("hold", False, "keep the position after a stop; otherwise the force goes to zero"),
 )
 """Parameters of :class:`fric.control.safety.Limits`."""
+RESUME = NodeParameter("resume", True, "wall time: go on by itself when a command or a joint state that was lost is back")
+ENABLED = NodeParameter("enable_at_start", True, "wall time: let forces through from the start; otherwise when ~/enable asks")
 
 _RENAMED = {"force_limit": "force", "speed_limit": "speed", "temperature_limit": "temperature"}
 
 
-def limits_of(settings: Settings, period: float) -> Limits:
+def safety_parameters(*left_out: str, **defaults: float) -> tuple[NodeParameter, ...]:
+    """The parameters of a node on whose side the loop is simulated: no limit but those that are given, in wall time only.
+
+    Args:
+        left_out: names of those that the node declares itself, or has no use for.
+        defaults: by name, where they differ.
+    """
+    given = {"force_rate": _NONE, **defaults}
+    return tuple(
+        replace(p, default=given.get(p.name, p.default), doc=f"wall time: {p.doc}") for p in SAFETY if p.name not in left_out
+    )
+
+
+def limits_of(settings: Settings, period: float, **given: float | bool) -> Limits:
     """The limits, for a loop with ``period`` [s].
+
+    Args:
+        settings: values of the parameters.
+        period: of the loop.
+        given: limits by their names in :class:`Limits`, in the place of parameters.
 
     Raises:
         SafetyError: they make no sense together.
     """
     values: dict[str, Any] = {}
     for parameter in SAFETY:
-        if isinstance(parameter.default, bool):
+        if isinstance(parameter.default, bool) or parameter.name not in settings:
             continue
         value = settings.number(parameter.name)
         unlimited = abs(value) >= _NONE
         values[_RENAMED.get(parameter.name, parameter.name)] = math.copysign(math.inf, value) if unlimited else value
-    return Limits(**values, hold=settings.flag("hold"), longest_step=2.0 * period)
+    values |= {"hold": settings.flag("hold"), "longest_step": 2.0 * period, **given}
+    return Limits(**values)

@@ -19,6 +19,7 @@ from .qos import DIAGNOSTICS
 
 __all__ = ["Deadlines", "Reporter"]
 
+_TROUBLES = ("refused", "watchdog", "command lost", "command burst", "joint state lost", "reference lost", "controller not")
 _MISS = 1.5  # periods longer than this times the nominal one are misses
 
 
@@ -62,6 +63,10 @@ class Deadlines:
                 self.misses += 1
         self._last = now
 
+    def skip(self) -> None:
+        """The activity rests; the time until its next period counts for nothing."""
+        self._last = None
+
     def latency(self, seconds: float) -> None:
         """An input was answered ``seconds`` [s] after its stamp."""
         self._latencies += 1
@@ -100,7 +105,7 @@ class Reporter:
         node: whose they are.
         period: between two reports [s].
         deadlines: its periodic activity.
-        counters: what it counts; one whose name starts with ``refused`` or ``watchdog`` is a trouble while it grows.
+        counters: what it counts; one whose name begins with a trouble's is one while it grows.
         verdict: level and text of a report, from the troubles since the last one.
         more: further entries, asked for at every report.
     """
@@ -131,7 +136,7 @@ class Reporter:
         missed = self._deadlines.misses - self._misses_before
         self._before = Counter(self._counters)
         self._misses_before = self._deadlines.misses
-        troubles = [name for name in grown if name.startswith(("refused", "watchdog"))]
+        troubles = [name for name in grown if name.startswith(_TROUBLES)]
         return [*troubles, f"{missed} deadlines missed"] if missed else troubles
 
     def publish(self) -> None:

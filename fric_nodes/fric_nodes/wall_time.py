@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter
+from collections.abc import Callable
 
 from fric.control.controller import Law
 from fric.control.reference import ReferencePoint
 from fric.control.reference_guard import ReferenceGuard, ReferenceLimits
+from fric.control.safe_control import SafeControl
+from fric.control.safety import SafetyLayer
 from fric.control.stall import StallGuard, StallLimits
 
 from .convert import JointSample
 from .loop import LoopNode, wall_clock
+from .managed import ManagedNode
 from .parameters import NodeParameter, Settings
+from .safety_panel import SafetyPanel
+from .safety_parameters import ENABLED, RESUME, limits_of, safety_parameters
 
-__all__ = ["REFERENCES", "STATES", "StampClock", "WallControl", "reference_guard"]
+__all__ = ["LIMITS", "REFERENCES", "STATES", "StampClock", "WallControl", "reference_guard"]
 
 _FAR = 1e6  # physical scale: beyond any axis; stands for no limit of its own, and still refuses 1e300
-_OVER = 1.0  # physical scale: [s] without another one, after which something is over
 REFERENCES = (
     NodeParameter(
         "reference_timeout", 0.1, "wall time: without a reference for so long the axis is brought to rest", "s", 1e-3, 1e6
@@ -34,6 +38,11 @@ REFERENCES = (
 STATES = (
     NodeParameter("state_timeout", 0.05, "wall time: a joint state of this age is dropped", "s", 1e-3, 1e3),
     NodeParameter("bridge_time", 0.05, "wall time: a gap between joint states of at most so long is bridged", "s", 1e-3, 1e3),
+)
+LIMITS = (
+    *safety_parameters("force_limit", "command_timeout", "state_timeout", "clock_tolerance", "temperature_limit"),
+    RESUME,
+    ENABLED,
 )
 
 
@@ -72,58 +81,61 @@ def reference_guard(settings: Settings) -> ReferenceGuard:
 
 
 class WallControl:
-    """A law that answers joint states as they come.
+    """A law that answers joint states as they come, behind a safety layer.
 
     Args:
-        node: counts what is refused, and says in the log when something begins and ends.
+        node: counts what is refused, says in the log when something begins and ends, and offers the layer's services.
         law: gives the force.
+        send: publishes a force [F] of the time [ns], where there is one without a joint state.
 
     Raises:
         InputError: the parameters make no sense together.
     """
 
-    def __init__(self, node: LoopNode, law: Law) -> None:
-        settings = node.settings
+    def __init__(self, node: ManagedNode, law: Law, send: Callable[[int, float], None]) -> None:
+        settings, period = node.settings, node.period
         self._node = node
         self._now = StampClock(node)
-        self._references = reference_guard(settings)
-        limits = StallLimits(
-            node.period, settings.number("state_timeout"), settings.number("bridge_time"), settings.number("clock_tolerance")
-        )
-        self._guard = StallGuard(law, self._references, limits)
-        self._references.counters = self._guard.counters = node.counters
-        self._before: Counter[str] = Counter()
-        self._total = 0
-        self._lasting: dict[str, float] = {}  # what goes on, and when it was last counted [s]
+        self._send = send
+        references = reference_guard(settings)
+        timeout, tolerance = settings.number("state_timeout"), settings.number("clock_tolerance")
+        guard = StallGuard(law, references, StallLimits(period, timeout, settings.number("bridge_time"), tolerance))
+        given = {"command_timeout": max(timeout, 3.0 * period), "state_timeout": timeout, "clock_tolerance": tolerance}
+        self.layer = SafetyLayer(limits_of(settings, period, **given, resume=settings.flag(RESUME.name)))
+        self._control = SafeControl(guard, self.layer, 2.0 * period, settings.flag(ENABLED.name))
+        self.panel = SafetyPanel(node, self.layer, self._now, self._control.enable, self._control.disable)
+        references.counters = guard.counters = node.counters
+        node.create_timer(2.0 * period, self._idle, clock=node.steady)
 
     def reference(self, reference: ReferencePoint) -> None:
         """Take in a reference."""
-        self._references.take(self._now(), *reference)
+        self._control.reference(self._now(), *reference)
 
-    def answer(self, state: JointSample, feedforward: float) -> float | None:
-        """The force [F] that answers ``state``; None when it is dropped, or the first one after a gap."""
+    def answer(self, state: JointSample, feedforward: float, referees: int) -> float | None:
+        """The force [F] that answers ``state``, with so many publishers of references; None when there is none to send."""
+        now = self._now()
+        self._control.referees(now, referees)
         acting = state.effort if math.isfinite(state.effort) else 0.0
-        force = self._guard.answer(self._now(), state.stamp, state.position, feedforward, acting)
-        self._log()
+        force = self._control.answer(now, state.stamp, state.position, feedforward, acting)
+        self.panel.log()
         return force
+
+    def _idle(self) -> None:
+        now = self._now()
+        force = self._control.idle(now)
+        if force is not None:
+            self._send(now, force)
+            self.panel.log()
+
+    def start(self) -> None:
+        """Go on where a stop ended: enable with the next joint states, if that is wanted from the start."""
+        self._control.begin(self._node.settings.flag(ENABLED.name))
+
+    def stop(self) -> None:
+        """Stop the axis within its limits, and send no force then."""
+        self._control.disable(self._now())
 
     @property
     def following(self) -> str:
         """What the setpoint does."""
-        return self._references.following.value
-
-    def _log(self) -> None:
-        """Say once when something begins to be refused or lost, and once when it is over."""
-        counters, now = self._node.counters, time.monotonic()
-        total = sum(counters.values())
-        if total != self._total:
-            for name, count in counters.items():
-                if count > self._before[name]:
-                    if name not in self._lasting:
-                        self._node.get_logger().warning(name)
-                    self._lasting[name] = now
-            self._total, self._before = total, Counter(counters)
-        elif self._lasting:
-            for name in [name for name, last in self._lasting.items() if now - last > _OVER]:
-                del self._lasting[name]
-                self._node.get_logger().info(f"over: {name}")
+        return self._control.guard.references.following.value

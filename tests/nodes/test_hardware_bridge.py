@@ -57,7 +57,7 @@ class Partner:
         self.publisher = self.node.create_publisher(Float64, "force_command", DEEP)
         self.node.create_timer(0.005, self._command)
         self.clients = {
-            name: self.node.create_client(Trigger, f"hardware_bridge/{name}") for name in ("enable", "disable", "reset_fault")
+            name: self.node.create_client(Trigger, f"hardware_bridge/{name}") for name in ("enable", "disable", "reset")
         }
         graph.spin(self.bridge)
         graph.spin(self.node)
@@ -105,7 +105,7 @@ def test_commands_act_only_when_enabled_and_every_cause_is_named(
     assert partner.reports[-1].level in {DiagnosticStatus.ERROR, DiagnosticStatus.WARN, DiagnosticStatus.OK}
     partner.force = 5.0
     assert "command lost" in partner.ask("enable").message
-    graph.until(lambda: partner.ask("reset_fault").success, "reset")
+    graph.until(lambda: partner.ask("reset").success, "reset")
     partner.enable()
     graph.until(lambda: emulator.force == 5.0, "it moves again")
     # A second publisher.
@@ -121,7 +121,7 @@ def test_commands_act_only_when_enabled_and_every_cause_is_named(
 
 def test_a_drive_that_is_unplugged_comes_back_without_force(graph: Graph, emulator: SerialEmulator, tmp_path: Path) -> None:
     partner = Partner(
-        graph, **{"driver": "serial", "serial.port": str(tmp_path / "drive"), "serial.timeout": 0.3, "autostart": True}
+        graph, **{"driver": "serial", "serial.port": str(tmp_path / "drive"), "serial.timeout": 0.3, "enable_at_start": True}
     )
     partner.force = 10.0
     graph.until(lambda: emulator.force == 10.0, "it starts by itself")
@@ -140,7 +140,7 @@ def test_a_drive_that_is_unplugged_comes_back_without_force(graph: Graph, emulat
 
 def test_a_drive_behind_topics(graph: Graph) -> None:
     partner = Partner(
-        graph, driver="ros2_control", autostart=True, drive_states="drive/joint_states",
+        graph, driver="ros2_control", enable_at_start=True, drive_states="drive/joint_states",
         **{"ros2_control.joint": "j2", "ros2_control.joints": "j1, j2", "ros2_control.ratio": 10.0},
         **{"ros2_control.timeout": 0.5},
     )  # fmt: skip
@@ -169,7 +169,7 @@ def test_a_can_drive(graph: Graph) -> None:
 
     drive = Cia402Emulator(axis(), "fric-bridge", 50.0, 1e7)
     partner = Partner(
-        graph, driver="cia402", autostart=True,
+        graph, driver="cia402", enable_at_start=True,
         **{
             "cia402.interface": "virtual", "cia402.channel": "fric-bridge", "cia402.rated_force": 50.0,
             "cia402.increments": 1e7, "cia402.heartbeat": 2.0,

@@ -145,6 +145,11 @@ class ReferenceGuard:
         self.following = Following.RESTING if self._setpoint.velocity == 0.0 else Following.STOPPING
 
     @property
+    def position(self) -> float:
+        """Position of the last setpoint [x]; NaN before the first."""
+        return math.nan if self.following is Following.WAITING else self._setpoint.position
+
+    @property
     def lost(self) -> bool:
         """True while the setpoint is brought to rest, or rests, because no reference comes."""
         return self.following in {Following.STOPPING, Following.RESTING}

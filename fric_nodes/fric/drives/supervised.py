@@ -56,6 +56,10 @@ class SupervisedDrive:
                 self._start(now)
         return reading
 
+    def begin(self, enabled: bool) -> None:
+        """Enable once as soon as there are readings to rely on, from now on; or not."""
+        self._starts = enabled
+
     def _opens(self, now: int) -> bool:
         if self._next_try is not None and 0 <= self._next_try - now <= _RETRY:
             return False

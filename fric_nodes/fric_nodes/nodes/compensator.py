@@ -19,9 +19,9 @@ from fric_interfaces.msg import Reference
 from ..compensation import COMPENSATION, Compensation
 from ..forces import STAMPED, ForcePublisher, reference_in
 from ..lockstep import Answers
-from ..loop import LOCK_STEP, PERIOD, LoopNode
+from ..loop import LOCK_STEP, PERIOD
+from ..managed import ManagedNode
 from ..model_intake import ModelIntake
-from ..qos import SAMPLES
 from ..run import run
 from ..wall_time import REFERENCES, StampClock, reference_guard
 
@@ -30,7 +30,7 @@ __all__ = ["CompensatorNode", "main"]
 PARAMETERS = (PERIOD, LOCK_STEP, *COMPENSATION, *REFERENCES, STAMPED)
 
 
-class CompensatorNode(LoopNode):
+class CompensatorNode(ManagedNode):
     """Feedforward for one axis; options as for ``rclpy.node.Node``.
 
     Raises:
@@ -39,6 +39,9 @@ class CompensatorNode(LoopNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("compensator", PARAMETERS, **options)
+
+    def configure(self) -> None:
+        """Read the model, and make the topics."""
         settings = self.settings
         # The middle of the interval in which the command acts. In wall time the reference is half a period old on average when
         # a joint state meets it, and the messages take a while.
@@ -52,15 +55,26 @@ class CompensatorNode(LoopNode):
         self._stamps, self._watch = StampClock(self), reference_guard(settings)
         self._watch.counters = self.counters
         self._answers: Answers[ReferencePoint, float] = Answers()
-        self.create_subscription(Reference, "reference", self._on_reference, SAMPLES)
+        self.create_subscription(Reference, "reference", self._on_reference, self.input_qos)
 
-    def condition(self) -> Mapping[str, str]:
+    def activate(self) -> None:
+        """Begin at rest."""
+        self._force.reset()
+        self._answers.clear()
+
+    def summary(self) -> str:
+        """What the node works with."""
+        limits = "" if self.lock_step else f"; {self._watch.limits}"
+        told = ", ".join(f"{name} {value}" for name, value in self._compensation.condition().items())
+        return f"{super().summary()}; {told}{limits}"
+
+    def state_of(self) -> Mapping[str, str]:
         """What the node adds to its report."""
         return self._compensation.condition()
 
     def _on_reference(self, message: Reference) -> None:
         reference = self.usable("reference", reference_in, message)
-        if reference is None:
+        if reference is None or not self.active:
             return
         if self.lock_step:
             self._on_step(reference)

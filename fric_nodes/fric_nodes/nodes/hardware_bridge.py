@@ -1,19 +1,18 @@
 """A real drive in the place of ``plant``: takes ``force_command``, gives ``joint_states``, with the safety layer in front.
 
 The parameter ``driver`` chooses the drive's protocol from :mod:`fric.drives`; its options are the parameters under its name.
-The bridge enables only on request (``~/enable``), or once by ``autostart``; a fault stops the axis and stays until
-``~/reset_fault``. ``/diagnostics`` names every cause, and the log says when each begins.
+The bridge enables only on request (``~/enable``), or once by the parameter ``enable_at_start``; a fault stops the axis and
+stays until ``~/reset``. ``/diagnostics`` names every cause, and the log says when each begins.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from fric.control.safety import SafetyLayer
 from fric.drives import DRIVES
 from fric.drives.drive import checked_options
@@ -23,22 +22,23 @@ from std_msgs.msg import Float64
 
 from fric_interfaces.msg import Reference, StampedForce
 
-from ..convert import MessageError, from_seconds, set_stamp
+from ..convert import from_seconds, set_stamp
 from ..drive_topics import DriveTopics
-from ..forces import STAMPED, force_in, force_type
-from ..loop import PERIOD, LoopNode, wall_clock
+from ..forces import STAMPED, force_or_nan, force_type
+from ..loop import PERIOD, wall_clock
+from ..managed import ManagedNode
 from ..parameters import NodeParameter
 from ..qos import SAMPLES
 from ..run import run
+from ..safety_panel import SafetyPanel
 from ..safety_parameters import SAFETY, limits_of
-from ..triggers import add_triggers
 
 __all__ = ["HardwareBridgeNode", "main"]
 
 PARAMETERS = (
     PERIOD,
     NodeParameter("driver", "serial", "protocol of the drive", choices=tuple(DRIVES)),
-    NodeParameter("autostart", False, "enable once, as soon as there are readings to rely on"),
+    NodeParameter("enable_at_start", False, "enable once, as soon as there are readings to rely on"),
     NodeParameter("drive_states", "drive/joint_states", "ros2_control: topic of its joint states"),
     *SAFETY,
     STAMPED,
@@ -50,7 +50,7 @@ PARAMETERS = (
 )
 
 
-class HardwareBridgeNode(LoopNode):
+class HardwareBridgeNode(ManagedNode):
     """A bridge to one drive; options as for ``rclpy.node.Node``.
 
     Raises:
@@ -59,14 +59,17 @@ class HardwareBridgeNode(LoopNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("hardware_bridge", PARAMETERS, **options)
+
+    def configure(self) -> None:
+        """Make the drive, which is opened with the first tick, and the topics."""
         settings = self.settings
         kind = DRIVES[settings.text("driver")]
         given = {option.name: self.get_parameter(f"{kind.id}.{option.name}").value for option in kind.options}
         link = DriveTopics(self, settings.text("drive_states")) if kind.id == "ros2_control" else None
         self._layer = SafetyLayer(limits_of(settings, self.period))
-        self._layer.counters = self.counters
         drive = kind.make(checked_options(kind, given), self._now, link)
-        self._drive = SupervisedDrive(drive, self._layer, settings.flag("autostart"))
+        self._drive = SupervisedDrive(drive, self._layer)
+        self._panel = SafetyPanel(self, self._layer, self._now)
         self._epoch, self._origin = wall_clock()
         self._state = JointState(name=[self.joint], position=[0.0])
         self._state.header.frame_id = self.joint
@@ -75,36 +78,37 @@ class HardwareBridgeNode(LoopNode):
         self._wanted = (0, math.nan)
         if math.isfinite(self._layer.limits.following_error):
             self.create_subscription(Reference, "reference", self._on_reference, self.input_qos)
-        requests = {"enable": self._layer.enable, "disable": self._layer.disable, "reset_fault": self._layer.reset}
-        add_triggers(self, {name: self._at_once(act) for name, act in requests.items()})
         self.create_timer(self.period, self._tick, clock=self.steady)
-        self.get_logger().info(f"{kind.title}; joint {self.joint}, {self.period:g} s; limits: {self._layer.limits}")
+
+    def activate(self) -> None:
+        """Publish joint states; enable with the first of them, if that is wanted."""
+        self._drive.begin(self.settings.flag("enable_at_start"))
+
+    def deactivate(self) -> None:
+        """Stop the axis; the drive stays open, its joint states are not published any more."""
+        self._drive.begin(False)
+        self._layer.disable(self._now())
+
+    def release(self) -> None:
+        """Take the force away, and let go of the drive."""
+        self._drive.close()
+
+    def summary(self) -> str:
+        """What the node works with."""
+        return f"{super().summary()}; {DRIVES[self.settings.text('driver')].title}; {self._layer.limits}"
 
     def _now(self) -> int:
         """The time of stamps [ns]: that of day at the start, and counted on without its corrections."""
         return self._epoch + time.monotonic_ns() - self._origin
 
-    def condition(self) -> Mapping[str, object]:
+    def state_of(self) -> Mapping[str, object]:
         """What the node adds to its report."""
-        state = self._layer.condition()
+        state = self._panel.condition()
         return {"driver": self.settings.text("driver"), "drive": self._drive.trouble or "open", **state}
 
-    def verdict(self, troubles: Sequence[str]) -> tuple[bytes, str]:
+    def judgement(self, troubles: Sequence[str]) -> tuple[bytes, str]:
         """Level and text of the report: faults first, then what hinders or was refused."""
-        layer = self._layer
-        said = [f"{name} ({detail})" for name, detail in layer.faults.items()]
-        said += [f"drive: {self._drive.trouble}"] if self._drive.trouble else []
-        level = DiagnosticStatus.ERROR if said else DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK
-        return level, "; ".join([layer.state.value, *said, *troubles])
-
-    def _at_once(self, act: Callable[[int], None]) -> Callable[[], str]:
-        """``act`` at the present time; then the state of the layer."""
-
-        def acted() -> str:
-            act(self._now())
-            return self._layer.state.value
-
-        return acted
+        return self._panel.verdict(troubles, *([f"drive: {self._drive.trouble}"] if self._drive.trouble else []))
 
     def _on_reference(self, message: Reference) -> None:
         self._wanted = (self._now(), message.position)
@@ -112,10 +116,7 @@ class HardwareBridgeNode(LoopNode):
     def _on_command(self, message: StampedForce | Float64) -> None:
         now, layer = self._now(), self._layer
         layer.publishers(self._commands.get_publisher_count())
-        try:
-            stamp, force = force_in(message)
-        except MessageError:
-            stamp, force = -1, math.nan  # the layer refuses it, and knows what it was
+        stamp, force = force_or_nan(message)
         layer.command(now, now if stamp < 0 else stamp, force)
 
     def _tick(self) -> None:
@@ -123,12 +124,8 @@ class HardwareBridgeNode(LoopNode):
         since, wanted = self._wanted
         fresh = now - since <= from_seconds(self._layer.limits.command_timeout)
         reading = self._drive.tick(now, wanted if fresh else math.nan)
-        for event in self._layer.events():
-            if event.text.startswith("fault"):
-                self.get_logger().error(event.text)
-            else:
-                self.get_logger().info(event.text)
-        if reading is not None:
+        self._panel.log()
+        if reading is not None and self.active:
             state = self._state
             set_stamp(state.header.stamp, reading.stamp)
             state.position = [reading.position]
@@ -136,10 +133,6 @@ class HardwareBridgeNode(LoopNode):
             state.effort = [self._layer.force if math.isnan(reading.effort) else reading.effort]
             self._publisher.publish(state)
         self.deadlines.tick(time.monotonic())
-
-    def close(self) -> None:
-        """Take the force away, and let go of the drive."""
-        self._drive.close()
 
 
 main = partial(run, HardwareBridgeNode)

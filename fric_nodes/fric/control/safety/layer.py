@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from enum import Enum
 from typing import NamedTuple
 
@@ -119,6 +120,15 @@ class SafetyLayer:
         self._refused.pop("command", None)
         return True
 
+    def allow(self, force: float) -> None:
+        """Change the largest force [F].
+
+        Raises:
+            SafetyError: it doesn't fit the other limits.
+        """
+        self.limits = self._motion.limits = replace(self.limits, force=force)
+        self._hold = Hold(self.limits)
+
     def publishers(self, count: int) -> None:
         """So many senders of commands are known; more than one at work is a fault."""
         self._publishers = count
@@ -177,8 +187,12 @@ class SafetyLayer:
 
     # Requests
 
-    def enable(self, now: int) -> None:
+    def enable(self, now: int, keep: bool = False) -> None:
         """Let commands through from now on.
+
+        Args:
+            now: present time [ns].
+            keep: let a command that has come just before through, too; otherwise only those that come from now on.
 
         Raises:
             SafetyError: a fault is latched, a stop is under way, or there is no joint state to rely on.
@@ -193,7 +207,8 @@ class SafetyLayer:
             why = self._refused.get("joint state", "none has come")
             raise SafetyError("safety", f"no joint state to rely on ({why})", "start the drive or the plant first")
         self._enter(State.ENABLED, now, "on request")
-        self._source = None
+        if not keep:
+            self._source = None
         self._asked = now
         self._burst = 0
         self._resuming = False
@@ -230,6 +245,21 @@ class SafetyLayer:
         elif self.state is State.DISABLED:
             self._enter(State.FAULT, now, cause)
 
+    def cut(self, now: int) -> None:
+        """The drive itself has taken the force away before ``now`` [ns], as its watchdog does."""
+        self.force = 0.0
+        self._motion.forget(now)
+
+    @property
+    def commanded(self) -> bool:
+        """True when there is a command that isn't lost yet."""
+        return self._now is not None and self._source is not None and not self._commands.lost(self._now)
+
+    @property
+    def resuming(self) -> bool:
+        """True while the layer waits for what was lost, to go on by itself."""
+        return self._resuming
+
     @property
     def cause(self) -> str:
         """The first latched fault with its detail; empty when there is none."""
@@ -265,12 +295,13 @@ class SafetyLayer:
 
     # Output
 
-    def step(self, now: int, reference: float = math.nan) -> float:
+    def step(self, now: int, reference: float = math.nan, between: bool = False) -> float:
         """The force [F] that may be applied from ``now`` [ns] on.
 
         Args:
             now: present time [ns].
             reference: position wanted now [x], for the following error; NaN: none.
+            between: True where this isn't the step of a sample but one between two, because a command has come.
         """
         limits = self.limits
         passed = 0.0 if self._now is None else (now - self._now) * _NS
@@ -279,9 +310,9 @@ class SafetyLayer:
             self.fail("clock went back", f"by {-passed:.6g} s", now)
         passed = min(max(passed, 0.0), limits.longest_step)
         if self.state is State.ENABLED:
-            self._watch(now, reference)
+            self._watch(now, reference, between)
         elif self._resuming and not (self._states.lost(now) or self._commands.lost(now)) and self._motion.known:
-            self.enable(now)
+            self.enable(now, keep=True)
         target, change = 0.0, limits.force_rate * passed if passed > 0.0 else 0.0
         if self.state is State.ENABLED:
             target = self._allowed(now, change, passed)
@@ -298,13 +329,15 @@ class SafetyLayer:
     def _trusted(self, now: int) -> bool:
         return not self._blind and self._motion.known and not self._states.lost(now)
 
-    def _watch(self, now: int, reference: float) -> None:
+    def _watch(self, now: int, reference: float, between: bool) -> None:
         """Look for what ends the enabled state."""
         limits, motion = self.limits, self._motion
-        if self._burst > _BURST:
-            self.counters["command burst"] += 1
-        self._burst = 0
-        if self._senders.sample(self._publishers):
+        if not between:
+            if self._burst > _BURST:
+                self.counters["command burst"] += 1
+            self._burst = 0
+            self._senders.sample(self._publishers)
+        if self._senders.many:
             self.fail("second command source", f"{self._publishers} publishers, more commands than samples", now)
             return
         newest = self._commands.newest

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from ...errors import InputError
 
@@ -16,6 +16,7 @@ class SafetyError(InputError):
 
 _POSITIVE = ("force", "force_rate", "speed", "command_timeout", "state_timeout", "longest_step", "brake_time", "readings")
 _MAY_BE_INFINITE = ("force_rate", "speed", "position_min", "position_max", "following_error", "temperature", "inertia_max")
+_INNER = {"readings", "longest_step", "rest_speed", "brake_time"}
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,12 @@ class Limits:
     rest_speed: float = 0.0
     hold: bool = False
     resume: bool = False
+
+    def __str__(self) -> str:
+        """Those that bound anything, in one line."""
+        given = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _INNER}
+        told = [f"{name} {value:g}" for name, value in given.items() if value and abs(value) != math.inf]
+        return f"limits: {', '.join(told)}"
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -39,12 +39,13 @@ class MotionWatch:
         limits: bounds of the axis.
 
     Attributes:
+        limits: bounds of the axis.
         velocity: mean velocity over the newest window [x/s]; 0 while unknown.
         known: True when ``velocity`` is from readings.
     """
 
     def __init__(self, limits: Limits) -> None:
-        self._limits = limits
+        self.limits = limits
         self._resistance = limits.friction + limits.load
         self._latency = round(limits.latency / _NS)
         self._given: deque[tuple[int, float]] = deque([(0, 0.0)])  # since when [ns], and which force [F]
@@ -65,6 +66,13 @@ class MotionWatch:
         self.velocity = 0.0
         self.known = False
         self._middle = 0.0
+
+    def forget(self, now: int) -> None:
+        """No force acts at ``now`` [ns], and since when nobody knows: forget readings and forces."""
+        self._forget_forces(now)
+        self._given.clear()
+        self._given.append((now, 0.0))
+        self.clear()
 
     def _forget_forces(self, now: int) -> None:
         self._changed = now
@@ -94,7 +102,7 @@ class MotionWatch:
 
     def _outside(self, first: int, second: int, stamp: int, position: float, integral: float) -> bool:
         """True when the readings at two indices and a third one are no motion of the axis."""
-        limits, times, positions, integrals = self._limits, self._times, self._positions, self._integrals
+        limits, times, positions, integrals = self.limits, self._times, self._positions, self._integrals
         before, after = (times[second] - times[first]) * _NS, (stamp - times[second]) * _NS
         change = (position - positions[second]) / after - (positions[second] - positions[first]) / before
         given = (integral - integrals[second]) / after - (integrals[second] - integrals[first]) / before
@@ -112,7 +120,7 @@ class MotionWatch:
     def jump(self, stamp: int, position: float) -> bool:
         """True when no motion leads from the last readings to ``position`` [x] at ``stamp`` [ns]."""
         times = self._times
-        limits = self._limits
+        limits = self.limits
         if abs(position) > self._farthest:
             return True
         if not times:
@@ -132,7 +140,7 @@ class MotionWatch:
         times, positions, n = self._times, self._positions, self._n
         integral, momentum = self._integrals_at(stamp)
         fits = True
-        if len(times) >= 2 * n and self._limits.brakes:
+        if len(times) >= 2 * n and self.limits.brakes:
             fits = not self._outside(-2 * n, -n, stamp, position, integral)
         if times:
             back = min(n, len(times))
@@ -170,7 +178,7 @@ class MotionWatch:
         """Bounds on the velocity at ``now`` [ns], the lower and the upper one [x/s]."""
         if not self.known:
             return 0.0, 0.0
-        limits = self._limits
+        limits = self.limits
         noise = 2.0 * limits.position_noise / self._span
         if not limits.brakes:
             return self.velocity - noise, self.velocity + noise

@@ -1,9 +1,10 @@
 """Whether two senders command at the same time, where messages don't say who sent them.
 
-A controller answers each sample once. With more than one sender known, the commands beyond one per sample are added up, less a
-slow leak, and those that lack are taken off; a sum above the threshold means that two of them are at work. A sender that is
-known and silent, as a process that was killed stays for a while, adds nothing, and a controller that is only unpunctual makes
-up for samples without a command.
+A controller answers each sample once; one that sends more often shows its rate while it is the only one known. With more than
+one sender known, what comes beyond that rate is added up, less a slow leak, and what lacks is taken off; a sum above the
+threshold means that two of them are at work. A sender that is known and silent, as a process that was killed stays for a
+while, adds nothing, and a controller that is only unpunctual makes up for samples without a command. What has queued up while
+this process was held up comes all at once: a single sample never counts so much that it passes the threshold.
 """
 
 from __future__ import annotations
@@ -12,17 +13,20 @@ __all__ = ["SenderWatch"]
 
 _MANY = 5.0  # numerical: commands more than samples; the jitter of one sender stays below
 _MOST = 10.0  # numerical: the sum goes no further, so that it is down again soon after the second sender has left
+_BURST = 5.0  # numerical: a sample counts as at most so many; one of them alone stays below the threshold
+_SHARE = 0.02  # numerical: share of a new sample in the rate of a single sender
 _LEAK = 0.01  # numerical: per sample; a second sender is found when it sends at more than a hundredth of the samples' rate
 
 
 class SenderWatch:
     """Commands against samples."""
 
-    __slots__ = ("_commands", "_surplus")
+    __slots__ = ("_commands", "_surplus", "_usual")
 
     def __init__(self) -> None:
         self._commands = 0
         self._surplus = 0.0
+        self._usual = 1.0
 
     def command(self) -> None:
         """A command has come."""
@@ -30,11 +34,13 @@ class SenderWatch:
 
     def sample(self, senders: int) -> bool:
         """A sample is over, and so many ``senders`` are known; True when more than one is at work."""
+        share = min(self._commands / self._usual, _BURST)
         if senders > 1:
             leaked = self._surplus - _LEAK if self._surplus > 0.0 else self._surplus
-            self._surplus = min(max(leaked + self._commands - 1, -_MANY), _MOST)
+            self._surplus = min(max(leaked + share - 1.0, -_MANY), _MOST)
         else:
             self._surplus = 0.0
+            self._usual = max(self._usual + _SHARE * self._usual * (share - 1.0), 1.0)
         self._commands = 0
         return self.many
 

@@ -1,0 +1,120 @@
+"""A controller behind the safety layer: what a joint state calls forth passes the layer before it leaves.
+
+The layer's readings are the joint states, its commands the controller's forces. While the layer lets nothing through, the
+controller starts anew with every state, so that nothing accumulates, and after the next enabling it begins at the axis's own
+motion with the force that acts. When joint states stay away, the layer takes the force away by itself; whoever has received no
+force for the command timeout has done so too, and then the layer goes on from zero.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .safety import SafetyError, SafetyLayer, State
+from .safety.senders import SenderWatch
+from .stall import StallGuard
+
+__all__ = ["SafeControl"]
+
+_NS = 1e9
+
+
+class SafeControl:
+    """Controller and safety layer of one axis.
+
+    Args:
+        guard: the controller with its reference.
+        layer: what its force passes.
+        wait: without a joint state for so long :meth:`idle` steps the layer [s].
+        enabled: enable once, as soon as there are joint states to rely on.
+    """
+
+    def __init__(self, guard: StallGuard, layer: SafetyLayer, wait: float, enabled: bool) -> None:
+        self.guard = guard
+        self.layer = layer
+        self._wait = round(_NS * wait)
+        self._starts = enabled
+        self._stepped: int | None = None
+        self._sent = 0.0
+        self._senders = SenderWatch()
+
+    def reference(self, now: int, stamp: int, position: float, velocity: float, acceleration: float) -> str:
+        """Take in a reference; why it is refused, or an empty text. Arguments as of :meth:`ReferenceGuard.take`."""
+        self._senders.command()
+        return self.guard.references.take(now, stamp, position, velocity, acceleration)
+
+    def referees(self, now: int, count: int) -> None:
+        """So many publishers of references are known, once per sample; more than one at work is a fault."""
+        if self._senders.sample(count):
+            self.layer.fail("second reference source", f"{count} publishers, more references than before", now)
+
+    def enable(self, now: int) -> None:
+        """Let forces through.
+
+        Raises:
+            SafetyError: as of the layer.
+        """
+        self.layer.enable(now)
+        self.guard.restart()
+        self._starts = False
+
+    def begin(self, enabled: bool) -> None:
+        """Go on after :meth:`disable`: enable once with the next joint states, if that is wanted."""
+        self._starts = enabled
+
+    def disable(self, now: int) -> None:
+        """Stop the axis, and let no force through."""
+        self._starts = False
+        self.layer.disable(now)
+
+    def answer(self, now: int, stamp: int, position: float, feedforward: float = 0.0, acting: float = 0.0) -> float | None:
+        """The force [F] to be sent for a joint state; None: none. Arguments as of :meth:`StallGuard.answer`."""
+        layer = self.layer
+        self._let_go(now)
+        wanted = None
+        if layer.reading(now, stamp, position):
+            self._start(now)
+            if self._starts or layer.resuming or layer.state is State.ENABLED:
+                most = layer.limits.force
+                wanted = self.guard.answer(now, stamp, position, feedforward, min(max(acting, -most), most))
+            else:
+                self.guard.restart()
+        if wanted is not None:
+            layer.command(now, now, wanted)
+        return self._given(now, wanted is not None)
+
+    def idle(self, now: int) -> float | None:
+        """Called now and then: the force to be sent [F] when no joint state has come for a while; None: none."""
+        if self._stepped is None or now - self._stepped < self._wait:
+            return None
+        self._let_go(now)
+        return self._given(now, False)
+
+    def _let_go(self, now: int) -> None:
+        """Go on from zero where nobody has been sent a force for so long that it acts no more."""
+        if self._stepped is not None and now - self._stepped > _NS * self.layer.limits.command_timeout:
+            self.layer.cut(now)
+
+    def _start(self, now: int) -> None:
+        """Enable as soon as the layer has readings to rely on, once."""
+        if not self._starts:
+            return
+        if self.layer.faults:
+            self._starts = False
+            return
+        try:
+            self.layer.enable(now)
+        except SafetyError:
+            return
+        self._starts = False
+
+    def _given(self, now: int, answered: bool) -> float | None:
+        layer = self.layer
+        force = layer.step(now, self.guard.references.position if answered else math.nan)
+        self._stepped = now
+        if layer.state is State.ENABLED and not answered:
+            return None
+        if layer.state is not State.ENABLED and force == 0.0 and self._sent == 0.0:
+            return None
+        self._sent = force
+        return force
