@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 
 from .safety import SafetyError, SafetyLayer, State
-from .safety.senders import SenderWatch
+from .safety.senders import StreamWatch
 from .stall import StallGuard
 
 __all__ = ["SafeControl"]
 
 _NS = 1e9
+_UNTIMELY = {"too old", "from the future", "not finite"}  # refused references whose stamps tell nothing
 
 
 class SafeControl:
@@ -36,17 +37,19 @@ class SafeControl:
         self._starts = enabled
         self._stepped: int | None = None
         self._sent = 0.0
-        self._senders = SenderWatch()
+        self._senders = StreamWatch(round(_NS * guard.period))
 
     def reference(self, now: int, stamp: int, position: float, velocity: float, acceleration: float) -> str:
         """Take in a reference; why it is refused, or an empty text. Arguments as of :meth:`ReferenceGuard.take`."""
-        self._senders.command()
-        return self.guard.references.take(now, stamp, position, velocity, acceleration)
+        why = self.guard.references.take(now, stamp, position, velocity, acceleration)
+        if why not in _UNTIMELY:
+            self._senders.value(stamp)
+        return why
 
     def referees(self, now: int, count: int) -> None:
-        """So many publishers of references are known, once per sample; more than one at work is a fault."""
-        if self._senders.sample(count):
-            self.layer.fail("second reference source", f"{count} publishers, more references than before", now)
+        """So many publishers of references are known; more than one at work is a fault."""
+        if self._senders.many(count):
+            self.layer.fail("second reference source", f"{count} publishers, more references than one sends", now)
 
     def enable(self, now: int) -> None:
         """Let forces through.

@@ -76,6 +76,11 @@ class StallGuard:
         self._usual_age = 0.0
         self._force = 0.0
 
+    @property
+    def period(self) -> float:
+        """Nominal time between two states [s]."""
+        return self._limits.period
+
     def restart(self) -> None:
         """Forget the motion so far; the next state is the first."""
         self._before, self._running = None, False

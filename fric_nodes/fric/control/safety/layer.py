@@ -64,6 +64,7 @@ class SafetyLayer:
         faults: latched faults, each cause by name with its detail, the first one first.
         counters: inputs refused, limits hit, stops: how often each, by name.
         force: the force given last [F].
+        resuming: True while the layer waits for what was lost, to go on by itself.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -91,7 +92,7 @@ class SafetyLayer:
         self._publishers = 1
         self._senders = SenderWatch()
         self._blind = False
-        self._resuming = False
+        self.resuming = False
         self._asked = self._deadline = 0
         self._motion.clear()
 
@@ -201,7 +202,7 @@ class SafetyLayer:
             return
         if self.faults:
             raise SafetyError("safety", f"fault: {self.cause}", "take the cause away and reset the fault")
-        if self.state is State.STOPPING and not self._resuming:
+        if self.state is State.STOPPING and not self.resuming:
             raise SafetyError("safety", "the axis is being stopped", "enable it when it rests")
         if self._states.lost(now) or not self._motion.known:
             why = self._refused.get("joint state", "none has come")
@@ -211,11 +212,11 @@ class SafetyLayer:
             self._source = None
         self._asked = now
         self._burst = 0
-        self._resuming = False
+        self.resuming = False
 
     def disable(self, now: int) -> None:
         """Stop the axis and let no command through from now on."""
-        self._resuming = False
+        self.resuming = False
         if self.state is State.ENABLED:
             self._stop(now, "on request")
 
@@ -237,7 +238,7 @@ class SafetyLayer:
         if cause in self.faults:
             return
         self.faults[cause] = detail
-        self._resuming = False
+        self.resuming = False
         self.counters[f"fault: {cause}"] += 1
         self._say(now, f"fault: {cause} ({detail})")
         if self.state is State.ENABLED:
@@ -254,11 +255,6 @@ class SafetyLayer:
     def commanded(self) -> bool:
         """True when there is a command that isn't lost yet."""
         return self._now is not None and self._source is not None and not self._commands.lost(self._now)
-
-    @property
-    def resuming(self) -> bool:
-        """True while the layer waits for what was lost, to go on by itself."""
-        return self._resuming
 
     @property
     def cause(self) -> str:
@@ -311,7 +307,7 @@ class SafetyLayer:
         passed = min(max(passed, 0.0), limits.longest_step)
         if self.state is State.ENABLED:
             self._watch(now, reference, between)
-        elif self._resuming and not (self._states.lost(now) or self._commands.lost(now)) and self._motion.known:
+        elif self.resuming and not (self._states.lost(now) or self._commands.lost(now)) and self._motion.known:
             self.enable(now, keep=True)
         target, change = 0.0, limits.force_rate * passed if passed > 0.0 else 0.0
         if self.state is State.ENABLED:
@@ -357,7 +353,7 @@ class SafetyLayer:
             self.counters[cause] += 1
             self._say(now, f"{cause} ({detail})")
             self._stop(now, cause)
-            self._resuming = True
+            self.resuming = True
         else:
             self.fail(cause, detail, now)
 

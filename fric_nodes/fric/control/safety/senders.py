@@ -9,7 +9,7 @@ this process was held up comes all at once: a single sample never counts so much
 
 from __future__ import annotations
 
-__all__ = ["SenderWatch"]
+__all__ = ["SenderWatch", "StreamWatch"]
 
 _MANY = 5.0  # numerical: commands more than samples; the jitter of one sender stays below
 _MOST = 10.0  # numerical: the sum goes no further, so that it is down again soon after the second sender has left
@@ -47,4 +47,43 @@ class SenderWatch:
     @property
     def many(self) -> bool:
         """True while more than one sender is at work."""
+        return self._surplus > _MANY
+
+
+class StreamWatch:
+    """Whether two senders send stamped values that answer nothing, by the time between their stamps.
+
+    One sender with a period is never faster than that, however its messages are held up and come in bursts. So what is added up
+    is one for each value, less the time since the stamp before in periods.
+
+    Args:
+        period: of one sender, at the start [ns]; one that is shorter is learnt while a single sender is known.
+    """
+
+    __slots__ = ("_newest", "_period", "_senders", "_surplus")
+
+    def __init__(self, period: int) -> None:
+        self._period = float(period)
+        self._newest: int | None = None
+        self._senders = 1
+        self._surplus = 0.0
+
+    def value(self, stamp: int) -> None:
+        """A value with ``stamp`` [ns] has come."""
+        newest = self._newest
+        self._newest = stamp if newest is None else max(newest, stamp)
+        if newest is None:
+            return
+        periods = min(max(stamp - newest, 0) / self._period, _BURST)
+        if self._senders > 1:
+            leaked = self._surplus - _LEAK if self._surplus > 0.0 else self._surplus
+            self._surplus = min(max(leaked + 1.0 - periods, -_MANY), _MOST)
+        elif periods < 1.0:
+            self._period = max(self._period * (1.0 - _SHARE * (1.0 - periods)), 1.0)
+
+    def many(self, senders: int) -> bool:
+        """So many ``senders`` are known; True when more than one is at work."""
+        self._senders = senders
+        if senders <= 1:
+            self._surplus = 0.0
         return self._surplus > _MANY
