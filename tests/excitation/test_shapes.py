@@ -7,7 +7,7 @@ import pytest
 from fric.excitation import EXCITATIONS
 from fric.excitation.prbs import maximum_length_sequence
 from fric.excitation.presliding_loops import turning_points
-from fric.excitation_kind import Points
+from fric.excitation_kind import ExcitationError, Points
 
 
 def _plan(name: str, seed: int = 3, **changes: float):  # type: ignore[no-untyped-def]
@@ -148,3 +148,26 @@ def test_graded_rests_come_as_often_as_asked_before_both_directions(shuffle: flo
         assert not a.any()
         _, v, _ = motion.at(np.array([end + 0.05, end + 0.1]))
         assert v == pytest.approx(np.full(2, 0.005 if number % 2 == 0 else -0.005))
+
+
+def test_two_axes_of_a_circle_keep_the_radius_and_the_feed() -> None:
+    first, second = (_plan("circle", axis=axis, radius=0.03, feed=0.06) for axis in (1.0, 2.0))
+    t = np.linspace(0.0, first.duration, 2000)
+    x, y = first.at(t), second.at(t)
+    np.testing.assert_allclose(np.hypot(x.position + 0.03, y.position), 0.03, rtol=1e-12)
+    steady = (t > 0.5) & (t < first.duration - 0.5)
+    np.testing.assert_allclose(np.hypot(x.velocity, y.velocity)[steady], 0.06, rtol=1e-9)
+    np.testing.assert_allclose(np.hypot(x.acceleration, y.acceleration)[steady], 0.06**2 / 0.03, rtol=1e-9)
+    with pytest.raises(ExcitationError, match="less than ramp_time"):
+        _plan("circle", turns=1.0, feed=1.0)
+
+
+def test_a_scan_steps_while_its_lines_turn() -> None:
+    line, step = (_plan("scanning", axis=axis, lines=4.0) for axis in (1.0, 2.0))
+    assert line.duration == pytest.approx(step.duration)
+    t = np.linspace(0.0, line.duration - 1.0, 4000)
+    along, across = line.at(t), step.at(t)
+    steady = np.abs(np.abs(along.velocity) - 0.02) < 1e-9
+    assert np.mean(steady) > 0.8
+    assert np.max(np.abs(across.velocity[steady])) < 1e-12
+    assert np.unique(np.round(across.position[steady] / 1e-4)).tolist() == [0.0, 1.0, 2.0, 3.0]

@@ -16,11 +16,12 @@ from typing import Protocol
 import numpy as np
 
 from ..axis import Measurement
+from ..excitation_kind import Trajectory
 from ..record import Array
 from .controller import Law, Setpoint
 from .feedforward_kind import Force
 
-__all__ = ["Body", "Course", "Reference", "follow", "point_to_point", "sine"]
+__all__ = ["Body", "Course", "Reference", "follow", "planned", "point_to_point", "sine"]
 
 _FAR = 1e6  # numerical: times the reference's range, beyond which a loop is unstable
 
@@ -106,6 +107,13 @@ def sine(period: float, amplitude: float, frequency: float, duration: float, fad
         amplitude * (dg * sin + g * w * cos),
         amplitude * (ddg * sin + 2.0 * dg * w * cos - g * w * w * sin),
     )
+
+
+def planned(motion: Trajectory, period: float) -> Reference:
+    """The motion of an excitation, sample by sample."""
+    time = np.minimum(period * np.arange(round(motion.duration / period) + 1, dtype=np.float64), motion.duration)
+    points = motion.at(time)
+    return Reference(period, points.position, points.velocity, points.acceleration)
 
 
 def point_to_point(
