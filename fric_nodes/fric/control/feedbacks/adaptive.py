@@ -39,11 +39,11 @@ from ...model import Model
 from ...parameter import Parameter
 from ...record import Array
 from ..controller import Controller, Setpoint, check_inputs
-from ..loop import Polynomials, pid_polynomials
 from ..tunable import Basis, Tunable
 from .disturbance_observer import Filtered
+from .error_pid import PID_PARAMETERS, AroundPid, gains_from, linear_pid
 from .friction_observer import Bristles
-from .pid import Pid, PidGains
+from .pid import PidGains
 
 __all__ = ["CONTROLLER", "Adaptation", "Adaptive"]
 
@@ -118,7 +118,7 @@ class Adaptation:
     bias: float = 0.0
 
 
-class Adaptive:
+class Adaptive(AroundPid):
     """The controller with its state.
 
     Args:
@@ -133,8 +133,7 @@ class Adaptive:
     """
 
     def __init__(self, gains: PidGains, adaptation: Adaptation, limit: float = math.inf) -> None:
-        self.pid = Pid(gains, limit)
-        self.limit = limit
+        super().__init__(gains, limit)
         self.adaptation = adaptation
         time = adaptation.observer_time
         self._error, self._force, self._way = Filtered(time), Filtered(time), Filtered(time)
@@ -148,11 +147,6 @@ class Adaptive:
         self.theta, self.used = np.zeros(3), np.zeros(3)
         learn(np.zeros(3), np.eye(3), np.zeros(3), 0.0, 1.0, self._most, self._work)  # compiles before the loop runs
         self.reset()
-
-    @property
-    def saturated(self) -> int:
-        """Number of samples at which the limit took something away."""
-        return self.pid.saturated
 
     def reset(self) -> None:
         """Start anew, at rest, with the friction that was given."""
@@ -248,12 +242,9 @@ class Adaptive:
         self.learnt += 1
 
 
-_GAINS = ("proportional", "integral", "derivative", "filter_time")
-
-
-def _build(given: dict[str, float], limit: float) -> Adaptive:
-    gains = PidGains(**{name: given.pop(name) for name in _GAINS})
-    return Adaptive(gains, Adaptation(**given), limit)
+def _build(given: Mapping[str, float], limit: float) -> Adaptive:
+    names = {each.name for each in PID_PARAMETERS}
+    return Adaptive(gains_from(given), Adaptation(**{name: value for name, value in given.items() if name not in names}), limit)
 
 
 def _start_of(model: Model) -> dict[str, float]:
@@ -292,19 +283,11 @@ def _gains(basis: Basis) -> dict[str, float]:
     }
 
 
-def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
-    kp, ki, kd, filter_time = (values[name] for name in _GAINS)
-    return [pid_polynomials(kp, ki, kd, filter_time, period)]
-
-
 CONTROLLER = Controller(
     id="adaptive",
     title="PID controller with friction identified in the loop",
     parameters=(
-        Parameter("proportional", "k_p", "F/x", "proportional gain", lower=0.0),
-        Parameter("integral", "k_i", "F/(x s)", "integral gain", lower=0.0, default=0.0),
-        Parameter("derivative", "k_d", "F s/x", "derivative gain", lower=0.0),
-        Parameter("filter_time", "T_f", "s", "time constant of the derivative's filter", lower=0.0, default=0.0),
+        *PID_PARAMETERS,
         Parameter("inertia", "J", "F s^2/x", "nominal inertia", positive=True),
         Parameter("inertia_share", "c_m", "1", "share of the inertia force that this law feeds forward", 0.0, 1.0, default=1.0),
         Parameter("observer_time", "T_q", "s", "time constant of the filter before the identification", positive=True),
@@ -327,8 +310,8 @@ CONTROLLER = Controller(
         Parameter("viscous", "F_v", "F s/x", "viscous coefficient at the start", lower=0.0, default=0.0),
         Parameter("bias", "b", "F", "constant force at the start", default=0.0),
     ),
-    build=lambda values, limit: _build(dict(values), limit),
+    build=_build,
     source="Astrom and Wittenmark 1995, sections 2.2 and 11.5; Canudas de Wit, Astrom, Braun 1987",
     from_model=_start_of,
-    tunable=Tunable(_gains, _linear),
+    tunable=Tunable(_gains, linear_pid),
 )

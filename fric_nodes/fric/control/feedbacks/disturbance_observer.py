@@ -28,9 +28,10 @@ from ...model import Model
 from ...parameter import Parameter
 from ...record import Array
 from ..controller import Controller, Setpoint, check_inputs
-from ..loop import Polynomials, added, pid_polynomials
+from ..loop import Polynomials, added
 from ..tunable import Basis, Tunable
-from .pid import Pid, PidGains
+from .error_pid import PID_PARAMETERS, AroundPid, gains_from, linear_pid
+from .pid import PidGains
 
 __all__ = ["CONTROLLER", "DisturbanceObserver", "Filtered", "nominal_of"]
 
@@ -67,7 +68,7 @@ class Filtered:
         self.value += share * (self._first - self.value)
 
 
-class DisturbanceObserver:
+class DisturbanceObserver(AroundPid):
     """The controller with its state.
 
     Args:
@@ -91,16 +92,10 @@ class DisturbanceObserver:
         dead_zone: float = 0.0,
         limit: float = math.inf,
     ) -> None:
-        self.pid = Pid(gains, limit)
-        self.limit = limit
+        super().__init__(gains, limit)
         self.inertia, self.damping, self.dead_zone = inertia, damping, dead_zone
         self._error, self._force = Filtered(observer_time), Filtered(observer_time)
         self.reset()
-
-    @property
-    def saturated(self) -> int:
-        """Number of samples at which the limit took something away."""
-        return self.pid.saturated
 
     def reset(self) -> None:
         """Start anew, at rest."""
@@ -155,8 +150,9 @@ def nominal_of(model: Model) -> dict[str, float]:
 
 
 def _build(values: dict[str, float], limit: float) -> DisturbanceObserver:
-    gains = PidGains(values["proportional"], values["integral"], values["derivative"], values["filter_time"])
-    return DisturbanceObserver(gains, values["inertia"], values["damping"], values["observer_time"], values["dead_zone"], limit)
+    return DisturbanceObserver(
+        gains_from(values), values["inertia"], values["damping"], values["observer_time"], values["dead_zone"], limit
+    )
 
 
 def _gains(basis: Basis) -> dict[str, float]:
@@ -170,7 +166,7 @@ def _gains(basis: Basis) -> dict[str, float]:
 def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
     """U (1 - Q/z) = (C + J s^2 Q + B s Q) e, of which everything is as :class:`Filtered` computes it."""
     time = values["observer_time"]
-    inner = pid_polynomials(values["proportional"], values["integral"], values["derivative"], values["filter_time"], period)
+    (inner,) = linear_pid(values, period)
     lag = np.array([time + period, -time])
     difference, low = np.array([1.0, -1.0]), np.array([period, 0.0])
     square = np.polymul(lag, lag)
@@ -186,10 +182,7 @@ CONTROLLER = Controller(
     id="disturbance_observer",
     title="PID controller with a disturbance observer",
     parameters=(
-        Parameter("proportional", "k_p", "F/x", "proportional gain", lower=0.0),
-        Parameter("integral", "k_i", "F/(x s)", "integral gain", lower=0.0, default=0.0),
-        Parameter("derivative", "k_d", "F s/x", "derivative gain", lower=0.0),
-        Parameter("filter_time", "T_f", "s", "time constant of the derivative's filter", lower=0.0, default=0.0),
+        *PID_PARAMETERS,
         Parameter("inertia", "J", "F s^2/x", "nominal inertia", positive=True),
         Parameter("damping", "B", "F s/x", "nominal viscous damping", lower=0.0, default=0.0),
         Parameter("observer_time", "T_q", "s", "time constant of the observer's filter", positive=True),

@@ -17,15 +17,14 @@ bias]``). Source: Canudas de Wit, Olsson, Astrom, Lischinsky 1995, section V (ob
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...model import Model, ModelError
 from ...parameter import Parameter
 from ..controller import Controller, Setpoint, check_inputs
-from ..loop import Polynomials, pid_polynomials
 from ..tunable import Basis, Tunable
-from .pid import Pid, PidGains
+from .error_pid import PID_PARAMETERS, AroundPid, gains_from, linear_pid
+from .pid import PidGains
 
 __all__ = ["CONTROLLER", "Bristles", "FrictionObserver", "bristles_of"]
 
@@ -68,7 +67,7 @@ class Bristles:
         return z_next, min(max(force, -bound), bound)
 
 
-class FrictionObserver:
+class FrictionObserver(AroundPid):
     """The controller with its state.
 
     Args:
@@ -95,16 +94,10 @@ class FrictionObserver:
         velocity_filter: float = 0.0,
         limit: float = math.inf,
     ) -> None:
-        self.pid = Pid(gains, limit)
-        self.limit = limit
+        super().__init__(gains, limit)
         self.bristles = bristles
         self._injection, self._scale, self._share, self._filter = injection, scale, reference_share, velocity_filter
         self.reset()
-
-    @property
-    def saturated(self) -> int:
-        """Number of samples at which the limit took something away."""
-        return self.pid.saturated
 
     def reset(self) -> None:
         """Start anew, at rest with relaxed bristles."""
@@ -159,7 +152,6 @@ def bristles_of(model: Model) -> dict[str, float]:
 
 
 def _build(given: dict[str, float], limit: float) -> FrictionObserver:
-    gains = PidGains(given["proportional"], given["integral"], given["derivative"], given["filter_time"])
     bristles = Bristles(
         given["coulomb"],
         max(given["static"], given["coulomb"]),
@@ -168,11 +160,14 @@ def _build(given: dict[str, float], limit: float) -> FrictionObserver:
         given["bristle_damping"],
     )
     return FrictionObserver(
-        gains, bristles, given["injection"], given["scale"], given["reference_share"], given["velocity_filter"], limit
+        gains_from(given),
+        bristles,
+        given["injection"],
+        given["scale"],
+        given["reference_share"],
+        given["velocity_filter"],
+        limit,
     )
-
-
-_PID = ("proportional", "integral", "derivative", "filter_time")
 
 
 def _gains(basis: Basis) -> dict[str, float]:
@@ -194,19 +189,11 @@ def _gains(basis: Basis) -> dict[str, float]:
     return {**basis.pid, "integral": integral, **bristles, **rest}
 
 
-def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
-    kp, ki, kd, filter_time = (values[name] for name in _PID)
-    return [pid_polynomials(kp, ki, kd, filter_time, period)]
-
-
 CONTROLLER = Controller(
     id="friction_observer",
     title="PID controller with an observer of the LuGre state",
     parameters=(
-        Parameter("proportional", "k_p", "F/x", "proportional gain", lower=0.0),
-        Parameter("integral", "k_i", "F/(x s)", "integral gain", lower=0.0, default=0.0),
-        Parameter("derivative", "k_d", "F s/x", "derivative gain", lower=0.0),
-        Parameter("filter_time", "T_f", "s", "time constant of the derivative's filter", lower=0.0, default=0.0),
+        *PID_PARAMETERS,
         Parameter("coulomb", "F_C", "F", "Coulomb force", positive=True),
         Parameter("static", "F_S", "F", "static friction force; at least the Coulomb force", lower=0.0, default=0.0),
         Parameter("stribeck", "v_S", "x/s", "Stribeck velocity", positive=True, default=1.0),
@@ -220,5 +207,5 @@ CONTROLLER = Controller(
     build=lambda values, limit: _build(dict(values), limit),
     source="Canudas de Wit, Olsson, Astrom, Lischinsky 1995, section V",
     from_model=bristles_of,
-    tunable=Tunable(_gains, _linear),
+    tunable=Tunable(_gains, linear_pid),
 )

@@ -29,6 +29,7 @@ from ...parameter import Parameter
 from ..controller import Controller, Setpoint, check_inputs
 from ..loop import Polynomials, pid_polynomials
 from ..tunable import Basis, Tunable
+from .error_pid import ErrorPid
 
 __all__ = ["CONTROLLER", "NonlinearPid", "NonlinearPidGains"]
 
@@ -64,21 +65,21 @@ class NonlinearPid:
     Args:
         gains: of all parts.
         limit: largest output [F].
-
-    Attributes:
-        saturated: number of samples at which the limit took something away.
     """
 
     def __init__(self, gains: NonlinearPidGains, limit: float = math.inf) -> None:
         self.gains = gains
         self.limit = limit
-        self.saturated = 0
-        self.reset()
+        self._pid = ErrorPid(gains.derivative, gains.filter_time, limit)
+
+    @property
+    def saturated(self) -> int:
+        """Number of samples at which the limit took something away."""
+        return self._pid.saturated
 
     def reset(self) -> None:
         """Start anew, at rest."""
-        self._integral = self._derivative = 0.0
-        self._before: float | None = None
+        self._pid.reset()
 
     def _near(self, error: float, velocity: float) -> float:
         return math.exp(-((error / self.gains.error_scale) ** 2) - (velocity / self.gains.speed_scale) ** 2)
@@ -86,13 +87,9 @@ class NonlinearPid:
     def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
         """Start in motion, see :meth:`fric.control.controller.Law.begin`."""
         gains = self.gains
-        error, rate = wanted.position - state[0], wanted.velocity - state[1]
-        self._before = error - duration * rate
-        self._derivative = gains.derivative * rate
-        proportional = (
-            gains.proportional * (1.0 + (gains.proportional_factor - 1.0) * self._near(error, wanted.velocity)) * error
-        )
-        self._integral = force - proportional - self._derivative if gains.integral > 0.0 else 0.0
+        near = self._near(wanted.position - state[0], wanted.velocity)
+        proportional = gains.proportional * (1.0 + (gains.proportional_factor - 1.0) * near)
+        self._pid.begin(proportional, gains.integral > 0.0, wanted, state, force, duration)
 
     def answer(self, wanted: Setpoint, measured: float, duration: float, feedforward: float = 0.0) -> float:
         """See :meth:`fric.control.controller.Law.answer`.
@@ -101,23 +98,12 @@ class NonlinearPid:
             ControlInputError: an input isn't finite, or the duration isn't positive; the state is left as it was.
         """
         check_inputs(wanted, measured, duration, feedforward)
-        gains = self.gains
-        error = wanted.position - measured
-        before = error if self._before is None else self._before
-        self._before = error
+        gains, error = self.gains, wanted.position - measured
         near = self._near(error, wanted.velocity)
-        proportional = gains.proportional * (1.0 + (gains.proportional_factor - 1.0) * near) * error
-        integral_gain = gains.integral * (1.0 + (gains.integral_factor - 1.0) * near)
-        self._integral += integral_gain * duration * error
-        filtered = gains.filter_time * self._derivative + gains.derivative * (error - before)
-        self._derivative = filtered / (gains.filter_time + duration)
-        free = proportional + self._integral + self._derivative + feedforward
-        output = min(max(free, -self.limit), self.limit)
-        if output != free:
-            self.saturated += 1
-            if integral_gain > 0.0 and gains.proportional > 0.0:
-                self._integral += (output - free) * min(duration * integral_gain / gains.proportional, 1.0)
-        return output
+        integral = gains.integral * (1.0 + (gains.integral_factor - 1.0) * near)
+        self._pid.integral += integral * duration * error
+        proportional = gains.proportional * (1.0 + (gains.proportional_factor - 1.0) * near)
+        return self._pid.output(error, proportional, integral, duration, feedforward)
 
 
 def _gains(basis: Basis) -> dict[str, float]:

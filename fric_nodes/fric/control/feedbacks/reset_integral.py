@@ -23,8 +23,8 @@ from collections.abc import Mapping
 
 from ...parameter import Parameter
 from ..controller import Controller, Setpoint, check_inputs
-from ..loop import Polynomials, pid_polynomials
 from ..tunable import Basis, Tunable
+from .error_pid import PID_PARAMETERS, ErrorPid, gains_from, linear_pid
 from .pid import PidGains
 
 __all__ = ["CONTROLLER", "ResetIntegral"]
@@ -42,7 +42,6 @@ class ResetIntegral:
         dwell: shortest time between two resets [s].
 
     Attributes:
-        saturated: number of samples at which the limit took something away.
         resets: number of resets.
     """
 
@@ -58,21 +57,23 @@ class ResetIntegral:
         self.gains = gains
         self.limit = limit
         self._factor, self._dead_zone, self._slow, self._dwell = reset_factor, dead_zone, slow, dwell
-        self.saturated = self.resets = 0
+        self._pid = ErrorPid(gains.derivative, gains.filter_time, limit)
+        self.resets = 0
         self.reset()
+
+    @property
+    def saturated(self) -> int:
+        """Number of samples at which the limit took something away."""
+        return self._pid.saturated
 
     def reset(self) -> None:
         """Start anew, at rest."""
-        self._integral = self._derivative = 0.0
-        self._before: float | None = None
+        self._pid.reset()
         self._side, self._since = 0.0, math.inf
 
     def begin(self, wanted: Setpoint, state: tuple[float, float], force: float, duration: float) -> None:
         """Start in motion, see :meth:`fric.control.controller.Law.begin`."""
-        gains = self.gains
-        error, rate = wanted.position - state[0], wanted.velocity - state[1]
-        self._before, self._derivative = error - duration * rate, gains.derivative * rate
-        self._integral = force - gains.proportional * error - self._derivative if gains.integral > 0.0 else 0.0
+        self._pid.begin(self.gains.proportional, self.gains.integral > 0.0, wanted, state, force, duration)
         self._side, self._since = 0.0, math.inf
 
     def answer(self, wanted: Setpoint, measured: float, duration: float, feedforward: float = 0.0) -> float:
@@ -82,65 +83,43 @@ class ResetIntegral:
             ControlInputError: an input isn't finite, or the duration isn't positive; the state is left as it was.
         """
         check_inputs(wanted, measured, duration, feedforward)
-        gains = self.gains
-        error = wanted.position - measured
-        before = error if self._before is None else self._before
-        self._before = error
+        gains, error = self.gains, wanted.position - measured
         self._since += duration
         if abs(error) > self._dead_zone:
             side = math.copysign(1.0, error)
             if side * self._side < 0.0 and abs(wanted.velocity) <= self._slow:
                 if self._since >= self._dwell:
-                    self._integral *= self._factor
+                    self._pid.integral *= self._factor
                     self.resets += 1
                 self._since = 0.0
             self._side = side
-            self._integral += gains.integral * duration * error
-        filtered = gains.filter_time * self._derivative + gains.derivative * (error - before)
-        self._derivative = filtered / (gains.filter_time + duration)
-        free = gains.proportional * error + self._integral + self._derivative + feedforward
-        output = min(max(free, -self.limit), self.limit)
-        if output != free:
-            self.saturated += 1
-            time = gains.anti_windup_time
-            if math.isfinite(time):
-                self._integral += (output - free) * duration / max(time, duration)
-        return output
+            self._pid.integral += gains.integral * duration * error
+        return self._pid.output(error, gains.proportional, gains.integral, duration, feedforward)
 
 
-def _build(given: dict[str, float], limit: float) -> ResetIntegral:
-    gains = PidGains(given["proportional"], given["integral"], given["derivative"], given["filter_time"])
-    return ResetIntegral(gains, given["reset_factor"], given["dead_zone"], given["slow"], limit, given["dwell"])
+def _build(given: Mapping[str, float], limit: float) -> ResetIntegral:
+    own = (given[name] for name in ("reset_factor", "dead_zone", "slow"))
+    return ResetIntegral(gains_from(given), *own, limit, given["dwell"])
 
 
 _PERIODS = 2.0 * math.pi  # physical: a swing of the loop at its margins takes so many times 1/crossover, or less
-
-_PID = ("proportional", "integral", "derivative", "filter_time")
 
 
 def _gains(basis: Basis) -> dict[str, float]:
     return {**basis.pid, "reset_factor": 0.0, "dead_zone": basis.dead_zone, "slow": 0.0, "dwell": _PERIODS / basis.crossover}
 
 
-def _linear(values: Mapping[str, float], period: float) -> list[Polynomials]:
-    kp, ki, kd, filter_time = (values[name] for name in _PID)
-    return [pid_polynomials(kp, ki, kd, filter_time, period)]
-
-
 CONTROLLER = Controller(
     id="reset_integral",
     title="PID controller whose integral is reset when the error passes zero",
     parameters=(
-        Parameter("proportional", "k_p", "F/x", "proportional gain", lower=0.0),
-        Parameter("integral", "k_i", "F/(x s)", "integral gain", lower=0.0),
-        Parameter("derivative", "k_d", "F s/x", "derivative gain", lower=0.0),
-        Parameter("filter_time", "T_f", "s", "time constant of the derivative's filter", lower=0.0, default=0.0),
+        *PID_PARAMETERS,
         Parameter("reset_factor", "r", "1", "what the integral is multiplied by at a reset", 0.0, 1.0, default=0.0),
         Parameter("dead_zone", "e_d", "x", "error within which the integral is held", lower=0.0, default=0.0),
         Parameter("slow", "v_r", "x/s", "speed of the reference up to which it is reset", lower=0.0, default=0.0),
         Parameter("dwell", "T_d", "s", "shortest time between two resets", lower=0.0, default=0.0),
     ),
-    build=lambda values, limit: _build(dict(values), limit),
+    build=_build,
     source="Clegg 1958; Beerens et al. 2019, Automatica 107",
-    tunable=Tunable(_gains, _linear),
+    tunable=Tunable(_gains, linear_pid),
 )
