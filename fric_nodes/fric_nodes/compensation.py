@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from fric.control.controller_file import read_controller
 from fric.control.fading import Faded
-from fric.control.feedforward import Feedforward
+from fric.control.feedforward import Feedforward, fastest_identified
 from fric.control.feedforward_kind import Force
 from fric.control.shaping import Shaped, Shaping
 from fric.errors import InputError
@@ -55,6 +55,7 @@ class Compensation:
 
     def __init__(self, settings: Settings, joint: str, period: float, usual_preview: float) -> None:
         self._settings, self._joint, self._usual = settings, joint, usual_preview
+        self._said = False
         self._file = path = settings.text("controller_file")
         model_file, fade, enabled = settings.text("model_file"), settings.number("transition_time"), settings.flag("enabled")
         if path and model_file:
@@ -101,7 +102,17 @@ class Compensation:
             "enabled": str(self._settings.flag("enabled")),
             "share in use": f"{self._faded.gain:.3g}",
             "limited": str(self.force.limited),
+            "references faster than the model's recordings": str(self._of_model.beyond),
         }
+
+    def beyond(self) -> str:
+        """One line, the first time that a reference is faster than the recordings of the model; empty otherwise."""
+        model = self._of_model.model
+        if self._said or self._of_model.beyond == 0 or model is None:
+            return ""
+        self._said = True
+        speed = fastest_identified(model)
+        return f"reference: faster than the recordings of the model ({speed:.3g}); its friction is extrapolated from there on"
 
     def checked(self, model: Model) -> Model:
         """``model`` as it would be used.
@@ -118,6 +129,7 @@ class Compensation:
     def use(self, model: Model) -> None:
         """Change to ``model``, over the transition time."""
         self._of_model.set_model(model)
+        self._said = False
 
 
 def _feedforward_of(path: str, period: float, preview: float) -> Force:

@@ -27,6 +27,7 @@ from ..errors import InputError
 from ..model import Model
 from .controller import Controller
 from .describing_function import LimitCycle, limit_cycles
+from .feedforward import refuse_impossible
 from .loop import LinearPlant, LoopMargins, margins
 from .trial import follow, point_to_point
 from .tunable import Basis
@@ -186,8 +187,9 @@ def autotune(
         calm: False leaves step 3 at its finding.
 
     Raises:
-        AutotuneError: the controller can't be tuned, or no gains keep what is required.
+        InputError: the controller can't be tuned, a value of the model can't be, or no gains keep what is required.
     """
+    refuse_impossible(model)
     required = Required() if required is None else required
     if controller.tunable is None:
         raise AutotuneError(f"controller '{controller.id}'", "doesn't say how it is tuned", "give its gains by hand")
@@ -237,8 +239,10 @@ def _basis(
         required.sensitivity,
     )
     plant = LinearPlant(model.total_inertia, damping, timing.period, timing.delay)
-    # What is chosen by its margins keeps them on the lightest and on the heaviest of the plants.
-    ends = [plant, min(plants, key=lambda each: each.mass), max(plants, key=lambda each: each.mass)]
+    # What is chosen by its margins keeps them on all corners of the plants, so that none of them lies beyond it.
+    masses, dampings = ([getattr(each, name) for each in plants] for name in ("mass", "damping"))
+    corners = [(mass, damping) for mass in (min(masses), max(masses)) for damping in (min(dampings), max(dampings))]
+    ends = [plant, *(replace(plant, mass=mass, damping=damping) for mass, damping in corners)]
     tunable = controller.tunable
     assert tunable is not None
 

@@ -23,13 +23,39 @@ from ..errors import InputError
 from ..model import Model
 from ..simulation import Predictor
 
-__all__ = ["Feedforward", "FeedforwardError", "prepare"]
+__all__ = ["SPEED", "Feedforward", "FeedforwardError", "fastest_identified", "prepare", "refuse_impossible"]
 
 _LONGEST_STEP = 10.0  # periods: a longer pause of the reference is taken as a pause, not as motion
 
 
 class FeedforwardError(InputError):
     """A feedforward that can't be set up as asked."""
+
+
+SPEED = "largest speed"
+"""Key of a model's provenance: how fast the recordings were that it was identified from [x/s]."""
+
+_FASTER = 1.1  # numerical: a reference may be so many times as fast before that is said; the speed recorded is an estimate
+
+
+def refuse_impossible(model: Model) -> None:
+    """Refuse a model with a value outside of what its parameter may be, as a fit without bounds can give it.
+
+    Raises:
+        FeedforwardError: a value is.
+    """
+    for parameter in model.parameters():
+        said = parameter.declaration.refusal(parameter.value)
+        if said is not None:
+            raise FeedforwardError("model", f"{parameter.name} {said}", "identify it again, from more motion or with a bound")
+
+
+def fastest_identified(model: Model) -> float:
+    """Largest speed [x/s] of the recordings of ``model``; infinite where the model doesn't say it."""
+    try:
+        return float(model.provenance[SPEED].split()[0])
+    except (KeyError, ValueError, IndexError):
+        return math.inf
 
 
 def prepare(model: Model) -> None:
@@ -93,6 +119,7 @@ class Feedforward:
         include_inertia: may be changed at any time.
         preview: may be changed at any time.
         friction: share of the last force that is friction [F].
+        beyond: number of references that were faster than the recordings of the model; friction is extrapolated there.
     """
 
     def __init__(
@@ -114,7 +141,9 @@ class Feedforward:
         self.include_inertia = include_inertia
         self.enabled = enabled
         self._model: Model | None = None
+        self._fastest = math.inf
         self.friction = 0.0
+        self.beyond = 0
         self.reset()
 
     def reset(self) -> None:
@@ -137,8 +166,9 @@ class Feedforward:
         """``model`` with those of its terms that are to be compensated.
 
         Raises:
-            FeedforwardError: the model has none of an effect that was asked for.
+            FeedforwardError: the model has none of an effect that was asked for, or a value that can't be.
         """
+        refuse_impossible(model)
         if self._terms:
             present = {held.effect.id for held in model.terms}
             missing = [name for name in self._terms if name not in present]
@@ -160,6 +190,7 @@ class Feedforward:
             model = self.selected(model)
             prepare(model)
         self._model = model
+        self._fastest = math.inf if model is None else _FASTER * fastest_identified(model)
         if at_once or self._transition_time <= 0.0:
             self._voices = [self._voice(model, 1.0)]
         else:
@@ -190,6 +221,8 @@ class Feedforward:
         """
         if not (math.isfinite(position) and math.isfinite(velocity) and math.isfinite(acceleration)):
             raise FeedforwardError("reference", "a value is not finite", "leave the sample out")
+        if abs(velocity) > self._fastest:
+            self.beyond += 1
         duration = self._period if self._time is None else time - self._time
         if not 0.0 < duration < _LONGEST_STEP * self._period:
             duration = self._period

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from ..errors import InputError
 from ..instrument import inspect
 from ..model import Model
@@ -21,6 +23,8 @@ from .screen import screened
 
 __all__ = ["Fitted", "identified", "silent"]
 
+_OVER = 20  # numerical: samples over which a speed is taken, so that an encoder's step doesn't count as one
+_NEARLY_ALL = 0.999  # statistical: share of the recording that is no faster, so that a single spike doesn't count
 Progress = Callable[[str], None]
 
 
@@ -89,11 +93,24 @@ def identified(
         "recordings": ", ".join(record.source for record in records),
         "method": chosen.id,
         "equations": str(result.train.n_samples),
+        "largest speed": f"{_fastest(records):.4g} {structure.units.position}/s",
     }
     result = replace(result, foreseen=foreseen, checks=checks, model=replace(result.model, provenance=provenance))
     if kept_apart:
         result = validated(result, chosen, records, kept_apart, options)
     return Fitted(result, tuple(records), tuple(kept_apart), options)
+
+
+def _fastest(records: Sequence[Record]) -> float:
+    """Largest speed of the recordings, as the mean over some samples [x/s]."""
+    found = 0.0
+    for record in records:
+        over = min(_OVER, record.n_samples - 1)
+        if over > 0:
+            way = record.position[over:] - record.position[:-over]
+            speeds = np.abs(way) / (record.time[over:] - record.time[:-over])
+            found = max(found, float(np.quantile(speeds, _NEARLY_ALL)))
+    return found
 
 
 def _foreseen(

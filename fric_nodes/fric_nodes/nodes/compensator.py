@@ -110,6 +110,9 @@ class CompensatorNode(ManagedNode):
         self._publish(stamp, force)
 
     def _publish(self, stamp: int, force: float) -> None:
+        said = self._compensation.beyond()
+        if said:
+            self.get_logger().warning(said)
         self._forces.publish(stamp, force)
         if self._friction.publisher.get_subscription_count() > 0:
             self._friction.publish(stamp, self._force.friction)

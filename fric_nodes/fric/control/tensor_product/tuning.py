@@ -21,6 +21,7 @@ from ...record import Array
 from ..autotune import Required, Timing, resting_width, stuck_stiffness
 from ..controller import Controller
 from ..feedbacks.tensor_product import designed_by
+from ..feedforward import refuse_impossible
 from ..loop import LinearPlant, margins, pid_polynomials
 from ..tuning import tune
 from .design import Requirements, TensorProductController, design
@@ -105,6 +106,7 @@ def tuned_tensor_product(
     Raises:
         TensorProductControlError: no design keeps what is required.
     """
+    refuse_impossible(model)
     required = Required() if required is None else required
     if not math.isfinite(timing.force_limit):
         raise TensorProductControlError("tensor-product controller", "the force has no limit", "give the timing one")
