@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from fric.bench.benchmarks.compensation import figures_of, step_times
 from fric.bench.compensation.catalogue import AXES
+from fric.bench.compensation.circle import circle_plot, peak, rounds
 from fric.bench.compensation.competition import Cell, Outcome, compete, interval, rest_figures, table
 from fric.bench.compensation.methods import METHODS, NEEDS_SPRINGS, QUICK, peak_at_reversals
 from fric.bench.compensation.page import competition_page, text_of_gain
@@ -137,3 +138,17 @@ def test_the_cylinder_gives_the_force_that_is_wanted() -> None:
     wanted = 8.0 * np.sin(2.0 * np.pi * 2.0 * 1e-3 * np.arange(1000))
     assert np.sqrt(np.mean((np.array(efforts) - wanted)[200:] ** 2)) < 2.0
     assert abs(body.position) < 0.05
+
+
+def test_a_circle_shows_its_quadrants_and_a_model_flattens_them() -> None:
+    held = rounds(3, 1.0, ("pid + velocity", "pid + pre-sliding model"))
+    before, after = (peak(error) for _, error in held.values())
+    assert before > 1e-5
+    assert after < 0.2 * before
+    angle, error = held["pid + velocity"]
+    # The largest deviations are just after the axes' reversals, at whole quarters of a turn.
+    at = math.degrees(angle[np.argmax(np.abs(error - np.mean(error)))]) % 90.0
+    assert min(at, 90.0 - at) < 15.0
+    plot, caption = circle_plot(held)
+    assert len(plot.data) == 2
+    assert "magnified" in caption

@@ -262,12 +262,15 @@ KNOWN: dict[str, Case] = {
         for what in ("effects", "effects dwell_time", "effects presliding", "plants", "excitations", "methods", "schema")
     },
     "fric verify --out verification.html": _long(7200.0),
+    **{f"fric verify compensation-{name}": _long(1200.0) for name in ("guideway", "robust")},
+    **{f"fric compete{quick} --out competition.html": _long(4 * 3600.0) for quick in ("", " --quick")},
     **dict.fromkeys(("fric compete", "fric demo", "fric demo --clock wall"), _long(4 * 3600.0)),
     "fric prove --cases 300 --seed 110 --out proof": _long(4 * 3600.0, status=(0, 1)),
     **{
         f"fric bench {name}": _long(4 * 3600.0, status=(0, 1))
         for name in (
             *("lock-step", "recordings", "fitting", "laws", "online", "faults", "tensor-product-control", "calibration"),
+            *("compensation", "circle"),
             *(f"calibration-{name}" for name in ("oscillation", "forced", "static", "two-stage", "tensor-product")),
         )
     },

@@ -43,7 +43,7 @@ def compete(
     from fric.bench.compensation.catalogue import AXES
     from fric.bench.compensation.competition import compete as run
     from fric.bench.compensation.methods import METHODS, QUICK
-    from fric.bench.compensation.page import competition_page
+    from fric.bench.compensation.page import circle_section, competition_page
     from fric.files import write_text
 
     if listed:
@@ -58,7 +58,12 @@ def compete(
     if out is not None:
         named = "".join(f" --axis {each}" for each in axis or ()) + "".join(f" --method '{each}'" for each in method or ())
         command = f"fric compete --seeds {count} --first-seed {first}{' --quick' if quick else ''}{' --aged' if aged else ''}"
-        write_text(out, competition_page(cells, f"{command}{named} --out {out.name}", time.monotonic() - begin, aged))
+        whole = f"{command}{named} --out {out.name}"
+        further = []
+        if not (quick or method) and "slide" in (axis or AXES):
+            progress("circle test of two slides")
+            further = [circle_section(first)]
+        write_text(out, competition_page(cells, whole, time.monotonic() - begin, aged, further))
     if as_json:
         typer.echo(json.dumps([_plain(c.axis, c.method, [asdict(o) for o in c.outcomes]) for c in cells]))
         return

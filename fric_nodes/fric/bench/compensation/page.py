@@ -10,9 +10,10 @@ import plotly.graph_objects as go
 from ...report.figures import COLOURS, Curve, stacked
 from ...report.page import Section, bullets, figure, paragraph, preformatted, render, table, tiles
 from .catalogue import AXES
+from .circle import circle_plot, rounds
 from .competition import Cell, interval, text_of
 
-__all__ = ["competition_page", "gains", "text_of_gain"]
+__all__ = ["circle_section", "competition_page", "gains", "text_of_gain"]
 
 _SHOWN = 4  # physical: curves in a plot that an eye tells apart
 _HUES = ("before", "measured", "second", "after", "true")
@@ -124,7 +125,14 @@ def _axis_section(axis: str, cells: Sequence[Cell], found: dict[tuple[str, str],
     return Section(axis, tuple([*blocks, plot] if plot else blocks))
 
 
-def competition_page(cells: Sequence[Cell], command: str, seconds: float, aged: bool) -> str:
+def circle_section(seed: int) -> Section:
+    """The circle test of two slides, the first of this seed."""
+    plot, caption = circle_plot(rounds(seed, 0.1))
+    lead = "Each axis reverses twice in a turn, and friction draws a peak there. Feed 50 mm/s; legend: largest deviation."
+    return Section("circle", (paragraph(lead), figure(plot, caption)))
+
+
+def competition_page(cells: Sequence[Cell], command: str, seconds: float, aged: bool, further: Sequence[Section] = ()) -> str:
     """The page as text.
 
     Args:
@@ -132,6 +140,7 @@ def competition_page(cells: Sequence[Cell], command: str, seconds: float, aged: 
         command: by which the reader gets the same page.
         seconds: that it took.
         aged: whether the friction changed after the recording.
+        further: sections at the end.
     """
     axes = list(dict.fromkeys(cell.axis for cell in cells))
     methods = list(dict.fromkeys(cell.method for cell in cells))
@@ -168,4 +177,4 @@ def competition_page(cells: Sequence[Cell], command: str, seconds: float, aged: 
         "from that recording alone"
         + (", and works on the axis after its friction has changed by up to 20 % more." if aged else ".")
     )
-    return render("Methods of friction compensation", lead, sections)
+    return render("Methods of friction compensation", lead, [*sections, *further])

@@ -98,8 +98,7 @@ class ResetIntegral:
 
 
 def _build(given: Mapping[str, float], limit: float) -> ResetIntegral:
-    own = (given[name] for name in ("reset_factor", "dead_zone", "slow"))
-    return ResetIntegral(gains_from(given), *own, limit, given["dwell"])
+    return ResetIntegral(gains_from(given), given["reset_factor"], given["dead_zone"], given["slow"], limit, given["dwell"])
 
 
 _PERIODS = 2.0 * math.pi  # physical: a swing of the loop at its margins takes so many times 1/crossover, or less
