@@ -36,6 +36,8 @@ setup(
         ("share/ament_index/resource_index/packages", from_here([HERE / "resource" / NAME])),
         (f"share/{NAME}", from_here([HERE / "package.xml"])),
         (f"share/{NAME}/config", from_here(list((HERE.parent / "config").glob("*.yaml")))),
+        (f"share/{NAME}/launch", from_here(list((HERE / "launch").glob("*.launch.py")))),
+        ("bin", from_here([HERE / "resource" / "bin" / "fric"])),  # colcon puts this folder on the PATH
     ],
     python_requires=">=3.10",
     install_requires=["setuptools"],
@@ -43,5 +45,7 @@ setup(
     entry_points={
         "console_scripts": [f"{node} = {NAME}.nodes.{node}:main" for node in NODES] + ["fric = fric_nodes.cli.main:main"],
         "fric.plugins": ["fric_nodes = fric_nodes"],
+        "ros2doctor.checks": ["FricCheck = fric_nodes.ros2_doctor:InstallationCheck"],
+        "ros2doctor.report": ["FricReport = fric_nodes.ros2_doctor:InstallationReport"],
     },
 )

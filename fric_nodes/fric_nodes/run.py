@@ -38,9 +38,15 @@ class _Stop:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
 
+    @staticmethod
+    def ignore() -> None:
+        """Let further signals pass."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
-        self.asked = True
-        if not self.made:
+        first, self.asked = not self.asked, True
+        if first and not self.made:
             raise KeyboardInterrupt
 
 
@@ -74,6 +80,8 @@ def run(kind: Callable[..., FricNode], args: list[str] | None = None) -> None:
     finally:
         stop.made = True
         rclpy.try_shutdown()
+        # A launch system passes on a signal that the terminal has sent already; the interpreter, about to end, would die of it.
+        stop.ignore()
 
 
 def _help(kind: Callable[..., FricNode], name: str) -> str:

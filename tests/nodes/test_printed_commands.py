@@ -214,7 +214,9 @@ KNOWN: dict[str, Case] = {
     "sphinx-build -W --keep-going docs docs/_build": Case(checked=_in_ci("sphinx-build -q -W --keep-going docs")),
     "fric record bags/my_run --topic /joint_states --topic /effort_controller/commands": Case(node="recorder"),
     "fric doctor bags/my_run": Case((_followed,)),
-    "colcon build && . install/setup.sh && ros2 run fric_nodes plant": Case(tool="colcon", long=True, node="plant"),
+    "colcon build && . install/setup.sh && ros2 run fric_nodes plant": Case(
+        checked=_in_ci("pip install --quiet 'fric[colcon]'", "pytest tests/packaging/test_colcon.py")
+    ),
     _IMPORT: Case((_map,)),
     "fric identify bags/run --terms coulomb,viscous,bias,asymmetry --out found": Case((_after(_IMPORT),)),
     "fric identify bags/slide --model config/start_model.yaml --out found": Case(),

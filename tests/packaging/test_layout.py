@@ -122,6 +122,9 @@ def test_colcon_scripts_go_where_ros2_run_looks() -> None:
     files = {target: {Path(name).name for name in names} for target, names in data_files}
     assert files["share/fric_nodes/config"] == {path.name for path in (ROOT / "config").glob("*.yaml")}
     assert files["share/fric_nodes"] == {"package.xml"}
+    assert files["share/fric_nodes/launch"] == {path.name for path in (ROOT / "fric_nodes/launch").glob("*.launch.py")}
+    assert files["bin"] == {"fric"}
+    assert os.access(ROOT / "fric_nodes/resource/bin/fric", os.X_OK)
     assert files["share/ament_index/resource_index/packages"] == {"fric_nodes"}
     assert version == importlib.metadata.version("fric")
     assert (ROOT / "fric_nodes/setup.cfg").read_text(encoding="utf-8").count("$base/lib/fric_nodes") == 2
