@@ -200,6 +200,7 @@ _SCREWS = (
 )
 _TIAGO = "fric import tiago_effort.csv --map config/published/torso.yaml --repair --out bags/torso"
 
+_STARTS = ("ros2 run fric_nodes", "fric node")
 _BRIDGE = "ros2 run fric_nodes hardware_bridge --ros-args --params-file config/hardware_bridge.yaml"
 _BRIDGE_NODE = ROOT / "fric_nodes" / "fric_nodes" / "nodes" / "hardware_bridge.py"
 
@@ -232,12 +233,23 @@ KNOWN: dict[str, Case] = {
     "fric simulate found/model.yaml --closed-loop config/controller.yaml --reference bags/my_run --out bags/closed": Case(
         (_found, _followed)
     ),
-    "ros2 run fric_nodes recorder --ros-args -p bag:=bags/my_run": Case(node="recorder"),
+    **dict.fromkeys([f"{start} recorder --ros-args -p bag:=bags/my_run" for start in _STARTS], Case(node="recorder")),
     "ros2 run fric_nodes player --ros-args -p bag:=bags/slide -p rate:=4.0": Case(node="player"),
-    "ros2 run fric_nodes compensator --ros-args --params-file config/compensator.yaml -p model_file:=found/model.yaml": Case(
-        (_found,), node="compensator"
-    ),
+    **{
+        f"{start} compensator --ros-args --params-file config/compensator.yaml -p model_file:=found/model.yaml": Case(
+            (_found,), node="compensator"
+        )
+        for start in _STARTS
+    },
     "ros2 run fric_nodes plant --help": Case(),
+    **dict.fromkeys(
+        (
+            "ros2 launch fric_nodes one_axis.launch.py model_file:=found/model.yaml bag:=bags/my_run",
+            "ros2 launch fric_nodes two_axes.launch.py bags:=bags/my_run",
+            "ros2 launch fric_nodes bridge.launch.py port:=/dev/ttyACM0",
+        ),
+        Case(checked=(ROOT / "tests" / "packaging" / "test_launch.py").is_file),
+    ),
     'eval "$(fric env)" && ros2 run fric_nodes plant': Case(node="plant"),
     'ros2 run fric_nodes excitation --ros-args --params-file config/excitation.yaml -p "wait_for_nodes:=[recorder]"': Case(
         node="excitation"
