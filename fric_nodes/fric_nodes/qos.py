@@ -56,7 +56,7 @@ SAMPLE_TOPICS: Mapping[str, tuple[str, ...]] = {
     "plant": ("joint_states", "force_command"),
     "hardware_bridge": ("joint_states", "force_command", "reference", "drive_states"),
     "excitation": ("joint_states", "reference", "force_command"),
-    "compensator": ("reference", "feedforward_force"),
+    "compensator": ("reference", "feedforward_force", "feedforward_friction"),
     "pid": ("joint_states", "reference", "feedforward_force", "force_command"),
     "experiment": ("joint_states", "reference", "feedforward_force", "force_command"),
     "identifier": ("joint_states",),

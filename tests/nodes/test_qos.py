@@ -57,7 +57,8 @@ def test_a_node_has_a_parameter_for_each_topic_of_samples(
             if not name.startswith(("friction/", "diagnostics", "rosout", "parameter_events")):
                 found.add(name)
     listed = {"drive_states" if name == "drive/joint_states" else name for name in found}
-    assert set(SAMPLE_TOPICS[node.get_name()]) - {"drive_states"} == listed - {"drive_states"}
+    known = set(SAMPLE_TOPICS[node.get_name()])
+    assert known - {"drive_states"} == listed - {"drive_states"}, "SAMPLE_TOPICS in fric_nodes/qos.py lists them by node"
 
 
 @pytest.mark.parametrize("chosen", ["reliable", "sensor_data"])
