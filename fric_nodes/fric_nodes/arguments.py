@@ -12,7 +12,7 @@ from rclpy.utilities import remove_ros_args
 
 from .parameters import NodeParameter
 
-__all__ = ["ArgumentError", "check_arguments", "help_text"]
+__all__ = ["ArgumentError", "check_arguments", "help_text", "params_files"]
 
 _WIDTH = 100  # columns of the help
 _HELP = ("-h", "--help")
@@ -31,7 +31,7 @@ def check_arguments(arguments: Sequence[str]) -> bool:
     Raises:
         ArgumentError: a parameter file that is not there or not readable, an argument that nobody takes, a broken rule.
     """
-    for path in _params_files(arguments):
+    for path in params_files(arguments):
         if not Path(path).is_file():
             raise ArgumentError(f"--params-file {path}", "there is no such file", "give the path of a ROS parameter file")
     try:
@@ -47,8 +47,8 @@ def check_arguments(arguments: Sequence[str]) -> bool:
     return False
 
 
-def _params_files(arguments: Sequence[str]) -> list[str]:
-    """The parameter files that the ROS arguments name."""
+def params_files(arguments: Sequence[str]) -> list[str]:
+    """The parameter files that the ROS arguments among ``arguments`` name."""
     found, ros = [], False
     for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
         if argument in {"--ros-args", "--"}:

@@ -20,7 +20,7 @@ import rclpy
 from fric.errors import InputError
 from rclpy.signals import SignalHandlerOptions
 
-from .arguments import check_arguments, help_text
+from .arguments import check_arguments, help_text, params_files
 from .base import Described, FricNode
 
 __all__ = ["run"]
@@ -63,12 +63,17 @@ def run(kind: Callable[..., FricNode], args: list[str] | None = None) -> None:
     stop = _Stop()
     name = re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__.removesuffix("Node")).lower()
     try:
-        if check_arguments(sys.argv if args is None else args):
+        args = sys.argv if args is None else args
+        if check_arguments(args):
             sys.stdout.write(_help(kind, name))
             return
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = kind()
         stop.made = True
+        files = params_files(args)
+        if files and not node._parameter_overrides:  # rclpy has no public way to ask for them
+            said = f"nothing in {', '.join(files)} is for {node.get_fully_qualified_name()}: see the name above ros__parameters"
+            node.get_logger().warning(said)
         _serve(node, stop)
     except InputError as error:
         sys.stderr.write(f"{name}: {' '.join(str(error).split())}\n")

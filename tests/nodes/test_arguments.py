@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from fric_nodes.arguments import ArgumentError, check_arguments, help_text
 from fric_nodes.base import Described
 from fric_nodes.nodes.plant import PlantNode
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import ListParameters, SetParameters
 
 if TYPE_CHECKING:
     from .conftest import Graph
@@ -98,6 +99,26 @@ def test_help_and_refusals_of_real_processes(graph: Graph, tmp_path: Path) -> No
         assert (status, out) == (2, ""), what
         assert said in error
         assert len(error.strip().splitlines()) == 1, what
+
+
+def test_a_parameter_file_for_another_node_is_named(graph: Graph, tmp_path: Path) -> None:
+    path = tmp_path / "left.yaml"
+    path.write_text("/left/plant:\n  ros__parameters:\n    period: 0.01\n", encoding="utf-8")
+    started = {
+        name: graph.start("-m", "fric_nodes.nodes.plant", "--ros-args", "--params-file", str(path), "-r", f"__ns:={name}")
+        for name in ("/left", "/right")
+    }
+    asker = graph.node("asker")
+    graph.spin(asker)
+    for name, process in started.items():  # a node that answers has said what it had to say
+        client = asker.create_client(ListParameters, f"{name}/plant/list_parameters")
+        graph.until(client.service_is_ready, f"{name}/plant is there")
+        graph.ask(client, ListParameters.Request(), name, process)
+    status, _, error = graph.finish(started["/right"], signal.SIGINT)
+    assert status == 0
+    assert f"nothing in {path} is for /right/plant" in error
+    status, _, error = graph.finish(started["/left"], signal.SIGINT)
+    assert (status, "nothing in" in error) == (0, False)
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "config").glob("*.yaml")), ids=lambda path: path.name)
