@@ -35,6 +35,10 @@ class PlantInTime:
         axis: moves with the clock.
         commands: where forces come from.
 
+    Attributes:
+        layer: the safety layer in front of the drive.
+        drive: the axis behind it.
+
     Raises:
         InputError: the limits make no sense together.
     """
@@ -51,8 +55,8 @@ class PlantInTime:
                 resume=settings.flag(RESUME.name),
             )
         )  # fmt: skip
-        self._drive = GuardedAxis(axis, self.layer, self.now(), settings.flag(ENABLED.name))
-        self.panel = SafetyPanel(node, self.layer, self.now, self._drive.enable, self._drive.disable)
+        self.drive = GuardedAxis(axis, self.layer, self.now(), settings.flag(ENABLED.name))
+        self.panel = SafetyPanel(node, self.layer, self.now, self.drive.enable, self.drive.disable)
 
     def now(self) -> int:
         """The time of stamps [ns]: that of day at the start, and counted on without its corrections."""
@@ -61,22 +65,22 @@ class PlantInTime:
     def command(self, stamp: int, force: float) -> None:
         """A command for ``force`` [F] has come, made at ``stamp`` [ns]; -1: nobody knows when."""
         now = self.now()
-        self._count(self._drive.command(now, now if stamp < 0 else stamp, force))
+        self._count(self.drive.command(now, now if stamp < 0 else stamp, force))
 
     def sample(self) -> int:
         """A sample begins; its stamp [ns]."""
         now = self.now()
-        self._count(self._drive.sample(now, self._commands.get_publisher_count()))
+        self._count(self.drive.sample(now, self._commands.get_publisher_count()))
         self.panel.log()
         return now
 
     def start(self) -> None:
         """Be enabled with the first command, if that is wanted from the start."""
-        self._drive.begin(self._node.settings.flag(ENABLED.name))
+        self.drive.begin(self._node.settings.flag(ENABLED.name))
 
     def stop(self) -> None:
         """Stop the axis within its limits, and give no force then."""
-        self._drive.disable(self.now())
+        self.drive.disable(self.now())
 
     def _count(self, ended: bool) -> None:
         if ended:

@@ -19,7 +19,10 @@ from .qos import DIAGNOSTICS
 
 __all__ = ["Deadlines", "Reporter"]
 
-_TROUBLES = ("refused", "watchdog", "command lost", "command burst", "joint state lost", "reference lost", "controller not")
+_TROUBLES = (
+    "refused", "watchdog", "command lost", "command burst", "joint state lost", "reference lost", "feedforward lost",
+    "controller not",
+)  # fmt: skip
 _MISS = 1.5  # periods longer than this times the nominal one are misses
 
 

@@ -8,10 +8,11 @@ when the process itself is held up.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from ..axis import SimulatedAxis
 from ..axis_in_time import TimedDrive
-from .safety import SafetyError, SafetyLayer
+from .safety import SafetyError, SafetyLayer, State
 
 __all__ = ["GuardedAxis"]
 
@@ -27,6 +28,11 @@ class GuardedAxis:
         layer: decides on the force; its command timeout is that of a command.
         now: time at the start [ns].
         enabled: enable with the first command.
+
+    Attributes:
+        layer: the safety layer.
+        witness: called with time [ns], force [F], true position [x] and the layer's state whenever the drive has been told a
+            force, for who judges what reaches the axis.
     """
 
     def __init__(self, axis: SimulatedAxis, layer: SafetyLayer, now: int, enabled: bool) -> None:
@@ -37,6 +43,7 @@ class GuardedAxis:
         self._axis = axis
         self.layer = layer
         self._starts = enabled
+        self.witness: Callable[[int, float, float, State], None] | None = None
         for before in (2, 1):
             layer.reading(now - before * _SEED, now - before * _SEED, axis.position)
         layer.step(now)
@@ -101,3 +108,5 @@ class GuardedAxis:
         force = self.layer.step(now, between=between)
         if fed or force != self._drive.force:
             self._drive.command(now, force)
+        if self.witness is not None:
+            self.witness(now, self._drive.force, self._axis.position, self.layer.state)

@@ -29,6 +29,7 @@ def bench(
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="All benchmarks, the long ones too.")] = False,
     listed: Annotated[bool, typer.Option("--list", help="List the benchmarks, and measure nothing.")] = False,
+    graph: Annotated[bool, typer.Option("--graph", help="With 'faults': in the running graph; takes half an hour.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed and accuracy on this machine; exit status 1 when a goal is missed."""
@@ -37,6 +38,10 @@ def bench(
     if listed:
         _list(list(BENCHMARKS.values()), as_json)
         return
+    if graph and "faults" not in (names or []):
+        raise InputError("fric bench", "--graph goes with the benchmark 'faults'", "fric bench faults --graph")
+    if graph:
+        names = [f"{name}-graph" if name == "faults" else name for name in names or []]
     chosen = names or [name for name, benchmark in BENCHMARKS.items() if everything or not benchmark.long]
     for name in chosen:
         if name not in BENCHMARKS:

@@ -126,6 +126,9 @@ class PidNode(ManagedNode):
         given, force = self._feedforward
         now = time.monotonic()
         fresh = now - given <= self.settings.number("feedforward_timeout")
+        if not fresh and force != 0.0:
+            self._feedforward = (given, 0.0)
+            self.counters["feedforward lost"] += 1
         answer = wall.answer(state, force if fresh else 0.0, self._references.get_publisher_count())
         if answer is None:
             return
