@@ -202,7 +202,7 @@ _TIAGO = "fric import tiago_effort.csv --map config/published/torso.yaml --repai
 
 _STARTS = ("ros2 run fric_nodes", "fric node")
 _BRIDGE = "ros2 run fric_nodes hardware_bridge --ros-args --params-file config/hardware_bridge.yaml"
-_BRIDGE_NODE = ROOT / "fric_nodes" / "fric_nodes" / "nodes" / "hardware_bridge.py"
+_SHELL = ROOT / "fric_nodes" / "fric_nodes"
 
 KNOWN: dict[str, Case] = {
     **dict.fromkeys(_TUTORIAL, Case(checked=_by_tutorial)),
@@ -283,16 +283,25 @@ KNOWN: dict[str, Case] = {
     **{
         f"fric bench {name}": _long(4 * 3600.0, status=(0, 1))
         for name in (
-            *("lock-step", "recordings", "fitting", "laws", "online", "faults", "tensor-product-control", "calibration"),
-            *("compensation", "circle"),
+            *("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph", "tensor-product-control"),
+            *("compensation", "circle", "calibration"),
             *(f"calibration-{name}" for name in ("oscillation", "forced", "static", "two-stage", "tensor-product")),
         )
     },
     "pip install 'fric[can]'": Case(checked=lambda: "\ncan = [" in (ROOT / "pyproject.toml").read_text(encoding="utf-8")),
     f"{_BRIDGE} -p driver:=serial -p serial.port:=/dev/ttyACM0": Case(node="hardware_bridge"),
-    "ros2 service call /hardware_bridge/enable std_srvs/srv/Trigger": Case(
-        checked=lambda: "~/enable" in _BRIDGE_NODE.read_text()
+    # Asked of running nodes, and by tools that not every installation has: tests/nodes/test_managed.py calls the services.
+    **dict.fromkeys(
+        (
+            *(
+                f"ros2 service call /{name} std_srvs/srv/Trigger"
+                for name in ("hardware_bridge/enable", "pid/reset", "pid/enable")
+            ),
+            *(f"ros2 lifecycle set /pid {transition}" for transition in ("configure", "activate")),
+        ),
+        Case(checked=lambda: '"enable"' in (_SHELL / "safety_panel.py").read_text() and (_SHELL / "managed.py").exists()),
     ),
+    "ros2 run fric_nodes pid --ros-args --params-file config/pid.yaml -p autostart:=false": Case(node="pid"),
     _TRIBOMETER: Case((_published("test_data_2.txt"),), data=True),
     "fric diagnose bags/tribometer --blocks 6 --start 8.5 --end 204 --model config/published/tribometer_nominal.yaml "
     "--out diagnosis": _long(needs=(_after(_TRIBOMETER),), data=True),

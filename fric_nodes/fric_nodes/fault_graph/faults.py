@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import signal
+import subprocess
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -230,6 +231,21 @@ def _nonsense(rig: GraphRig, _random: np.random.Generator) -> Callable[[], objec
     return lambda: None
 
 
+def _disk_full(rig: GraphRig, _random: np.random.Generator) -> Callable[[], object]:
+    recorder = rig.record(100_000)
+
+    def end() -> None:
+        try:
+            said, _ = recorder.communicate(timeout=30.0)
+        except subprocess.TimeoutExpired:
+            recorder.kill()
+            said, _ = recorder.communicate()
+        if recorder.returncode == 2 and "free space on the disk" in said:
+            rig.heard("the recorder says that the disk is full, and ends")
+
+    return end
+
+
 def _wild(rig: GraphRig, _random: np.random.Generator) -> Callable[[], object]:
     """Gains that are allowed, and with which the loop is unstable."""
     rig.set("pid", "kp", 2e5)
@@ -286,6 +302,7 @@ FAULTS: Mapping[str, GraphFault] = {
     "pid restarted in motion": GraphFault(_restarted("pid"), ("command lost",)),
     "plant restarted in motion": GraphFault(_restarted("plant"), _LOST_STATES),
     "parameters to nonsense in motion": GraphFault(_nonsense, ("parameters refused",)),
+    "disk full while a recorder runs": GraphFault(_disk_full, ("the disk is full",)),
     "gains far too large in motion": GraphFault(_wild, ("force rate limit", "force limit", "speed limit", *_ODD)),
 }  # fmt: skip
 """Every fault by its name."""

@@ -76,6 +76,7 @@ _NODES: Mapping[str, _Setup] = {
     ),
     "compensator": _Setup("fric_nodes.nodes.compensator", (), {"model_file": config_file("demo_axis.yaml")}),
 }  # fmt: skip
+_LIMITED = "import os, resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, 2 * ({},)); os.execv(sys.argv[1], sys.argv[1:])"
 _RELAYED = {"joint_states": JointState, "reference": Reference, "force_command": Float64}
 
 
@@ -111,6 +112,7 @@ class GraphRig:
         self._counted: dict[tuple[str, str], str] = {}
         self._said: set[str] = set()
         self._position = math.nan
+        self._bags = 0
         self._over = False
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain)
@@ -183,6 +185,20 @@ class GraphRig:
             self.processes[name] = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, env=environment
             )
+
+    def record(self, most: int) -> subprocess.Popen[str]:
+        """Start a recorder that may write so many bytes into a file, as on a disk that is full then; its output is piped."""
+        self._bags += 1
+        command = [sys.executable, "-m", "fric_nodes.nodes.recorder"]
+        command += ["--ros-args", "-p", f"bag:={self._folder / f'bag{self._bags}'}"]
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(self._domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        return subprocess.Popen(
+            [sys.executable, "-c", _LIMITED.format(most), *command],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=environment,
+        )
 
     def kill(self, name: str) -> None:
         """End the process of a node at once."""
