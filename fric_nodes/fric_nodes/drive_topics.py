@@ -10,7 +10,7 @@ from std_msgs.msg import Float64MultiArray
 
 from .base import FricNode
 from .convert import nanoseconds
-from .qos import SAMPLES
+from .qos import LATEST, SAMPLES
 
 __all__ = ["DriveTopics"]
 
@@ -27,7 +27,7 @@ class DriveTopics:
         self._node = node
         self._newest: JointState | None = None
         self._publishers: dict[str, Publisher] = {}
-        node.create_subscription(JointState, states, self._on_state, node.qos_of("drive_states", SAMPLES))
+        node.create_subscription(JointState, states, self._on_state, node.qos_of("drive_states", LATEST))
 
     def _on_state(self, message: JointState) -> None:
         self._newest = message

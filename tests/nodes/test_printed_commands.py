@@ -202,7 +202,7 @@ _TIAGO = "fric import tiago_effort.csv --map config/published/torso.yaml --repai
 
 _STARTS = ("ros2 run fric_nodes", "fric node")
 _BRIDGE = "ros2 run fric_nodes hardware_bridge --ros-args --params-file config/hardware_bridge.yaml"
-_SHELL = ROOT / "fric_nodes" / "fric_nodes"
+_ASKED = Case(checked=(ROOT / "tests" / "nodes" / "test_managed.py").is_file)  # of running nodes
 
 KNOWN: dict[str, Case] = {
     **dict.fromkeys(_TUTORIAL, Case(checked=_by_tutorial)),
@@ -290,17 +290,8 @@ KNOWN: dict[str, Case] = {
     },
     "pip install 'fric[can]'": Case(checked=lambda: "\ncan = [" in (ROOT / "pyproject.toml").read_text(encoding="utf-8")),
     f"{_BRIDGE} -p driver:=serial -p serial.port:=/dev/ttyACM0": Case(node="hardware_bridge"),
-    # Asked of running nodes, and by tools that not every installation has: tests/nodes/test_managed.py calls the services.
-    **dict.fromkeys(
-        (
-            *(
-                f"ros2 service call /{name} std_srvs/srv/Trigger"
-                for name in ("hardware_bridge/enable", "pid/reset", "pid/enable")
-            ),
-            *(f"ros2 lifecycle set /pid {transition}" for transition in ("configure", "activate")),
-        ),
-        Case(checked=lambda: '"enable"' in (_SHELL / "safety_panel.py").read_text() and (_SHELL / "managed.py").exists()),
-    ),
+    **{f"ros2 lifecycle set /pid {step}": _ASKED for step in ("configure", "activate")},
+    **{f"ros2 service call /{of} std_srvs/srv/Trigger": _ASKED for of in ("hardware_bridge/enable", "pid/reset", "pid/enable")},
     "ros2 run fric_nodes pid --ros-args --params-file config/pid.yaml -p autostart:=false": Case(node="pid"),
     _TRIBOMETER: Case((_published("test_data_2.txt"),), data=True),
     "fric diagnose bags/tribometer --blocks 6 --start 8.5 --end 204 --model config/published/tribometer_nominal.yaml "

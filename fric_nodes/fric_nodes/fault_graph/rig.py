@@ -174,6 +174,8 @@ class GraphRig:
     def start(self, name: str) -> None:
         """Start the process of a node."""
         setup = _NODES[name]
+        for key in [key for key in list(self._counted) if key[0] == name]:
+            del self._counted[key]
         command = [sys.executable, "-m", setup.module, "--ros-args"]
         for topic in setup.remapped:
             command += ["-r", f"{topic}:=raw/{topic}"]
@@ -269,9 +271,12 @@ class GraphRig:
         return None if answer is None else bool(answer.results[0].successful)
 
     def recover(self) -> bool:
-        """Reset what is latched and enable again; True when the axis moves."""
-        end = time.monotonic() + 20.0
+        """Reset what is latched and enable again; True when every node has reported and the axis moves."""
+        end = time.monotonic() + 30.0
         while time.monotonic() < end:
+            if not set(_NODES) <= {name for name, _ in list(self._counted)}:
+                time.sleep(0.05)
+                continue
             for name in ("plant", "pid"):
                 state = self._counted.get((name, "safety state"), "")
                 if state == "fault":
