@@ -12,12 +12,13 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ..axis import Measurement, SimulatedAxis
-from ..control.autotune import Timing, autotune
+from ..control.autotune import Required, Timing, autotune, plants_around
 from ..control.controller import Controller, Setpoint
 from ..control.feedbacks import CONTROLLERS
 from ..control.feedbacks.adaptive import Adaptive
 from ..control.feedforward import Feedforward
 from ..control.feedforward_kind import Force
+from ..control.loop import margins
 from ..control.trial import Reference, follow, point_to_point, sine
 from ..figure import Figure
 from ..model import Model, build_model, term
@@ -97,6 +98,25 @@ def _unexpected() -> list[Figure]:
         force = None if name in ("friction_observer", "adaptive") else _ahead(wrong)
         figures.append(Figure(f"the same, delay and encoder not known to autotuning, {name}", _resting(kind, gains, force),
                               "steps", f"<= {_CYCLE:g}"))  # fmt: skip
+    return figures
+
+
+def _kept() -> list[Figure]:
+    """Margins of what autotuning gives, on a hundred plants that it hasn't drawn."""
+    required, figures = Required(), []
+    for name in _KINDS:
+        kind = CONTROLLERS[name]
+        tunable = kind.tunable
+        assert tunable is not None
+        gains = autotune(_axis(), kind, _TIMING, draws=100, calm=False).gains
+        forms = tunable.linear(gains, _TIMING.period)
+        found = [[margins(plant, form) for form in forms] for plant in plants_around(_axis(), _TIMING, 100, seed=99)]
+        stable = sum(all(each.stable for each in one) for one in found)
+        kept = sum(all(required.kept(each, _TIMING.period) for each in one) for one in found)
+        figures += [
+            Figure(f"100 plants within 20 %, {name}: stable", float(stable), "", ">= 100"),
+            Figure(f"100 plants within 20 %, {name}: margins kept", float(kept), "", ">= 95"),
+        ]
     return figures
 
 
@@ -211,7 +231,7 @@ def _picture() -> tuple[go.Figure, str]:
 
 
 def _run() -> Evidence:
-    figures = [*_over_compensated(), *_unexpected()]
+    figures = [*_kept(), *_over_compensated(), *_unexpected()]
     figures += _learnt("friction doubled", _axis(), _axis(2.0))
     figures += _learnt("friction halved", _axis(), _axis(0.5))
     figures += _learnt("more friction in one direction, then in the other", _axis(bias=8.0), _axis(bias=-8.0))
