@@ -174,8 +174,8 @@ class GraphRig:
     def start(self, name: str) -> None:
         """Start the process of a node."""
         setup = _NODES[name]
-        for key in [key for key in list(self._counted) if key[0] == name]:
-            del self._counted[key]
+        for known in [known for known in list(self._counted) if known[0] == name]:
+            del self._counted[known]
         command = [sys.executable, "-m", setup.module, "--ros-args"]
         for topic in setup.remapped:
             command += ["-r", f"{topic}:=raw/{topic}"]
