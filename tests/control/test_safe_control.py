@@ -157,7 +157,7 @@ def test_a_second_publisher_of_references_is_a_fault_and_one_alone_is_none(perio
             now += period
             for k in range(senders):
                 # A sender may be late; what it sends then bears a later stamp.
-                stamp = now + (k * period) // 3 + int(random.exponential(0.1) * period)
+                stamp = now + (k * period) // 3 + int(random.exponential(0.3) * period)
                 control.reference(stamp, stamp, 0.0, 0.0, 0.0)
             control.referees(now, known)
         return "second reference source" in control.layer.faults

@@ -173,9 +173,12 @@ def _second(topic: str, kind: Any, value: Callable[[GraphRig, np.random.Generato
     def begin(rig: GraphRig, random: np.random.Generator) -> Callable[[], object]:
         publisher = rig.node.create_publisher(kind, topic, SAMPLES)
         make = value(rig, random)
-        timer = rig.node.create_timer(PERIOD, lambda: publisher.publish(make()))
+        sending = [True]
+        timer = rig.node.create_timer(PERIOD, lambda: publisher.publish(make()) if sending else None)
 
         def end() -> None:
+            sending.clear()
+            time.sleep(0.1)  # the relay's thread may be about to publish
             rig.node.destroy_timer(timer)
             rig.node.destroy_publisher(publisher)
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 __all__ = ["SenderWatch", "StreamWatch"]
 
-_MANY = 5.0  # numerical: commands more than samples; the jitter of one sender stays below
-_MOST = 10.0  # numerical: the sum goes no further, so that it is down again soon after the second sender has left
-_BURST = 5.0  # numerical: a sample counts as at most so many; one of them alone stays below the threshold
+_MANY = 3.0  # numerical: commands more than samples; the jitter of one sender stays below
+_MOST = 8.0  # numerical: the sum goes no further, so that it is down again soon after the second sender has left
+_BURST = 3.0  # numerical: a sample counts as at most so many; one of them alone stays below the threshold
 _SHARE = 0.02  # numerical: share of a new sample in the rate of a single sender
 _LEAK = 0.01  # numerical: per sample; a second sender is found when it sends at more than a hundredth of the samples' rate
 
@@ -60,10 +60,10 @@ class StreamWatch:
         period: of one sender, at the start [ns]; one that is shorter is learnt while a single sender is known.
     """
 
-    __slots__ = ("_newest", "_period", "_senders", "_surplus")
+    __slots__ = ("_longest", "_newest", "_period", "_senders", "_surplus")
 
     def __init__(self, period: int) -> None:
-        self._period = float(period)
+        self._period = self._longest = float(period)
         self._newest: int | None = None
         self._senders = 1
         self._surplus = 0.0
@@ -78,8 +78,8 @@ class StreamWatch:
         if self._senders > 1:
             leaked = self._surplus - _LEAK if self._surplus > 0.0 else self._surplus
             self._surplus = min(max(leaked + 1.0 - periods, -_MANY), _MOST)
-        elif periods < 1.0:
-            self._period = max(self._period * (1.0 - _SHARE * (1.0 - periods)), 1.0)
+        else:
+            self._period = min(max(self._period * (1.0 + _SHARE * (periods - 1.0)), 1.0), self._longest)
 
     def many(self, senders: int) -> bool:
         """So many ``senders`` are known; True when more than one is at work."""
