@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -206,3 +207,13 @@ def test_a_file_that_does_not_fit_is_refused(
     overrides = [Parameter(key, value=value) for key, value in values.items()]
     with pytest.raises(InputError, match=message):
         graph.owns(CompensatorNode(context=graph.context(), parameter_overrides=overrides))
+
+
+def test_references_faster_than_the_recordings_of_the_model_are_said(graph: Graph) -> None:
+    known = replace(_model(3.0), provenance={"largest speed": "0.5 m/s"})
+    write_model(known, graph.folder / "known.yaml")
+    bench = Bench(graph, model_file=str(graph.folder / "known.yaml"))
+    bench.send(4, velocity=0.4)
+    assert bench.compensator.state_of()["references faster than the model's recordings"] == "0"
+    bench.send(6, velocity=1.0)
+    assert bench.compensator.state_of()["references faster than the model's recordings"] == "6"
