@@ -270,6 +270,11 @@ class GraphRig:
         answer = self._ask(SetParameters, f"{name}/set_parameters", request)
         return None if answer is None else bool(answer.results[0].successful)
 
+    @property
+    def enabled(self) -> bool:
+        """True when plant and controller have said that they let forces through."""
+        return all(self._counted.get((name, "safety state")) == "enabled" for name in ("plant", "pid"))
+
     def recover(self) -> bool:
         """Reset what is latched and enable again; True when every node has reported and the axis moves."""
         end = time.monotonic() + 30.0
