@@ -9,7 +9,7 @@ show to be left makes a finding unsure or ``unknown``.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,11 +32,12 @@ from .component import Signature, agreed, signatures
 from .confidence import LITTLE_LEFT, MANY, UNEXPLAINED, confidence_of, is_doubtful, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, refit
-from .grow import Growth, by_parts, grow, helped, without_nothings
+from .grow import Growth, by_parts, grow, helped, with_moves, without_nothings
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
 from .locate import Where, locate, moved_back, steady
 from .other_laws import strained
+from .presence import Presence, presences
 from .result import (
     Diagnosis,
     Estimate,
@@ -149,7 +150,7 @@ def diagnose(
         tracks, start = started(nominal, train, as_given=True)
     parts = excerpt(tracks, start)
     searched = list(tracks if parts is None else parts.tracks)
-    growth = grow(searched, start, tell)
+    growth = with_moves(grow(searched, start, tell), tell)
     if growth.beyond > 0.0 or growth.rest > _most_left(growth):
         growth = by_parts(searched, growth, tell)
     if growth.beyond > 0.0 or growth.rest > _most_left(growth):
@@ -356,9 +357,7 @@ def _concluded(
         unexplained = replace(unexplained, where=where)
         if likely is not None and unknown:
             nobody = _unknown(where, likely, growth, scored, unexplained.share, stand_in)
-            # What helps beside something unknown was right in one of ten cases, however faint that is.
-            most = 1.0 - (unknown_confidence(unexplained.share) if beside else nobody.confidence)
-            findings = [nobody, *_at_most(most, findings)]
+            findings = [nobody, *_beside(presences(track, end, growth.steps), findings, growth.steps)]
     everything = None if alone is None else unexplained.where
     if missing:
         energy = _difference(fast, begin, end)
@@ -390,9 +389,16 @@ def _concluded(
     )
 
 
-def _at_most(confidence: float, findings: Sequence[Finding]) -> list[Finding]:
-    """What helps beside something unknown is told all the same, but with no more than ``confidence``; the largest first."""
-    held = [replace(each, confidence=min(each.confidence, round(confidence, 4))) for each in findings]
+def _beside(sure: Mapping[str, Presence], findings: Sequence[Finding], steps: Sequence[Step]) -> list[Finding]:
+    """What helps beside something unknown, as sure as it is there whatever that is; what takes most off first."""
+    by_effect = {step.term.split("#")[0]: sure[step.term] for step in steps}
+    held = []
+    for each in findings:
+        found = by_effect[each.effect]
+        runner = each.runner_up
+        if runner is not None:
+            runner = replace(runner, confidence=round(min(1.0 - found.probability, found.probability), 4))
+        held.append(replace(each, confidence=found.probability, runner_up=runner, reproduced=found.halves))
     return sorted(held, key=lambda each: -each.share)
 
 

@@ -15,14 +15,15 @@ from dataclasses import dataclass, field, replace
 from ..model import Model, Term
 from .additive.growing import grown_by_parts, middle_of
 from .candidates import candidates, scales_of
-from .fitting import NOTHING, State, best_track, refit
+from .fitting import NOTHING, State, best_track, refit, without_term
 from .laws import with_best_laws
+from .moves import reconsidered
 from .rivals import BY_CHANCE, OF_EXCESS, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
 from .screen import Screening, Tried, screen
 from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, audit, exchanged, is_nothing, merged, settled
 from .track import Track
 
-__all__ = ["Growth", "by_parts", "grow", "helped", "without_nothings"]
+__all__ = ["Growth", "by_parts", "grow", "helped", "with_moves", "without_nothings"]
 
 _TO_COMPARE = 2  # terms, after which another beginning is tried
 _OTHER_BEGINNINGS = 2
@@ -126,6 +127,33 @@ def _grown_faster(tracks: Sequence[Track], growth: Growth, tell: Callable[[str],
         more = _settled(_added([track], seen, None, tell))
         return more if more.steps and more.rest < _AGAIN and more.price < seen.price else growth
     return growth
+
+
+def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
+    """``growth``, or what moves on one score make of it (:mod:`.moves`), where it leaves more than laws of another form would.
+
+    Args:
+        growth: settled.
+        tell: told what is done.
+    """
+    left = growth.end.excess
+    if not growth.steps or left < max(NOTHING * growth.end.floor, _LITTLE * growth.begin.excess):
+        return growth
+    tell("reconsidering its laws and values")
+    state = reconsidered(growth.track, growth.begin, growth.end, tell)
+    if state is growth.end:
+        return growth
+    model = state.fit.model
+    there = {held.effect.id: prefix for prefix, held in zip(model.prefixes, model.terms, strict=True)}
+    steps = []
+    for step in growth.steps:
+        name = there.get(step.term.split("#")[0])
+        if name is not None:
+            without = refit(growth.track, without_term(model, name.split("#")[0]), max_iterations=8)
+            beside = without.left, state.left, without.floor, without.excess
+            steps.append(Step(name, *beside, step.rivals, step.screened, step.price))
+    more = _settled(replace(growth, end=state, steps=tuple(steps)))
+    return more if more.steps and more.price < growth.price else growth
 
 
 def by_parts(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:

@@ -29,8 +29,10 @@ def laws_beside(held: Term, scales: Scales) -> Iterator[Term]:
 
     yield from _shaped(held)
     for law in EFFECTS.values():
-        if law.id != held.effect.id or law.key == held.effect.key or law in worth_trying() or law.near:
+        if law.id != held.effect.id or law.key == held.effect.key or law.near:
             continue
+        if law in worth_trying() and held.effect in worth_trying():
+            continue  # both are tried otherwise
         if law.form_of not in ("", held.effect.law):
             continue
         # A shape means something else in every law.

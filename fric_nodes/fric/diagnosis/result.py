@@ -13,8 +13,9 @@ from ..instrument import Finding as Check
 from ..model import Model
 from ..record import Array
 from .additive.told import ComponentFinding
-from .confidence import FAINT
+from .confidence import AS_LIKELY, FAINT
 from .locate import Where
+from .presence import Half
 
 __all__ = [
     "Diagnosis",
@@ -70,6 +71,7 @@ class Finding:
         parameters: of the effect, by name.
         noe_before: NOE of the refitted nominal model on unseen recordings [%].
         noe_after: NOE of the grown model on them [%].
+        reproduced: what each half of the recordings says of it by itself; empty where that wasn't asked.
     """
 
     effect: str
@@ -84,6 +86,7 @@ class Finding:
     parameters: Mapping[str, Estimate]
     noe_before: float
     noe_after: float
+    reproduced: tuple[Half, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -216,6 +219,12 @@ class Diagnosis:
                     f"Something is missing that only the recording held back shows: the refitted model leaves an NOE of "
                     f"{v.noe_refit:.3g} % there, and the instruments alone leave {v.noise_floor:.3g} %; it sits here: {where}."
                 )
+            present = [each for each in self.findings[1:] if each.confidence >= AS_LIKELY]
+            if first and present:
+                return (
+                    f"Missing: {_with_odds(present)}; they don't explain all: {percent(first.share)} % of the missing force's "
+                    f"energy stays, and no known effect explains it; it sits here: {where}."
+                )
             helpful = listed([each.title for each in self.findings[1:]])
             left = ""
             if first and len(self.findings) == 2 and first.share < _HARDLY_ANY:
@@ -228,8 +237,7 @@ class Diagnosis:
             if v.stands_out < FAINT:
                 why = "it is too faint beside the noise to tell what"
             return f"Something is missing, and {why}; it sits here: {where}.{left}"
-        named = (each for each in self.findings if each.effect != "unknown")
-        names = listed([f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in named])
+        names = _with_odds([each for each in self.findings if each.effect != "unknown"])
         return f"Missing: {names}; with it the NOE on unseen data falls from {v.noe_refit:.3g} % to {v.noe_augmented:.3g} %."
 
     @property
@@ -305,6 +313,10 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
+def _with_odds(findings: Sequence[Finding]) -> str:
+    return listed([f"{each.title} ({min(round(100 * each.confidence), 99)} % sure)" for each in findings])
+
+
 def _where(where: Where | None) -> dict[str, Any]:
     if where is None:
         return {"time": [], "regime": ""}
@@ -332,6 +344,7 @@ def _finding(each: Finding) -> dict[str, Any]:
         "parameters": {name: {"value": e.value, "std": e.std, "unit": e.unit} for name, e in each.parameters.items()},
         "noe_before": each.noe_before,
         "noe_after": each.noe_after,
+        "reproduced": [{"nats": half.nats, "parameters": dict(half.parameters)} for half in each.reproduced],
     }
 
 

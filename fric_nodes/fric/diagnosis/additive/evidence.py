@@ -79,6 +79,7 @@ class Grouped:
             first += columns.shape[1]
         self.x = np.concatenate(parts, axis=1)
         self._gram = self.x.T @ self.x
+        self._factors: dict[str, Array] = {}
         self._load = self.x.T @ self.y
         self._power = float(self.y @ self.y)
 
@@ -99,12 +100,13 @@ class Grouped:
 
     def likeness(self, one: str, other: str) -> float:
         """Share of the energy of the columns of ``one`` that those of ``other`` explain, beside the base [1]."""
-        mine, theirs = self.x[:, self._spans[one]], self.x[:, self._spans[other]]
-        gram = theirs.T @ theirs
-        gram += _ALIKE * float(np.mean(np.diag(gram))) * np.eye(gram.shape[0])
-        load = theirs.T @ mine
-        whole = float(np.sum(mine**2))
-        return float(np.sum(load * np.linalg.solve(gram, load))) / max(whole, 1e-300)
+        mine, theirs = self._spans[one], self._spans[other]
+        if other not in self._factors:
+            gram = self._gram[theirs, theirs]
+            gram = gram + _ALIKE * float(np.mean(np.diag(gram))) * np.eye(gram.shape[0])
+            self._factors[other] = cholesky(gram, lower=True)
+        explained = solve_triangular(self._factors[other], self._gram[theirs, mine], lower=True)
+        return float(np.sum(explained**2)) / max(float(np.trace(self._gram[mine, mine])), 1e-300)
 
     def weighed(
         self, groups: Sequence[str], start: Mapping[str, float] | None = None, noise: float = -1.0, rounds: int = _ITERATIONS

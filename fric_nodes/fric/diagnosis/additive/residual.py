@@ -18,7 +18,7 @@ from ..track import Track, along
 from .components import BY_ID, COMB, COMPONENTS, OTHER_OF, OTHERS, Along, Component, Ranges, comb_cycles
 from .evidence import Grouped, Weighed
 
-__all__ = ["PRESENT", "Additive", "Presence", "additive"]
+__all__ = ["PRESENT", "Additive", "Presence", "additive", "independent_share"]
 
 PRESENT = 0.5
 """Probability from which on something is more likely missing in a component than not."""
@@ -125,7 +125,7 @@ def additive(track: Track, state: State) -> Additive:
     start = dict(zip(whole.groups, whole.sizes, strict=True))
     noise = float(np.log(whole.noise / grouped.size))
     left = grouped.residual(whole)
-    dependence = _independent_share(left)
+    dependence = independent_share(left)
     energy, total = float(np.mean(left**2)), grouped.size**2
     found, withouts = [], {}
     for name in grouped.names:
@@ -202,7 +202,7 @@ def _probability(nats: float) -> float:
     return float(1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0))))
 
 
-def _independent_share(residual: Array) -> float:
+def independent_share(residual: Array) -> float:
     """Independent rows over rows: one over one plus twice the sum of the autocorrelations until they first are not positive."""
     centred = residual - np.mean(residual)
     power = float(centred @ centred)

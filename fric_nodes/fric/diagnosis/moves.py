@@ -1,0 +1,132 @@
+"""A grown model reconsidered by moves on one score: a term less, another law, other values to begin with.
+
+What explained most when it came may only have mended what was not there yet, and the law by which it came may keep terms alive
+that mend its form. So a structure isn't final because its terms came in a good order: every term may go again or give way to
+another law of its effect, with everything fitted anew each time. All structures are judged by one number on one observer: the
+logarithm of the likelihood of blocks that the fit has not seen, less a price for each parameter and for a mass far from the one
+given. The observer has to be fast: a slow one lets a model stick and slip in its own way, and a wrong one may then leave less.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from ..model import Model, Term
+from .candidates import scales_of
+from .fitting import NOTHING, State, bounds_of, refit, without_term
+from .other_laws import laws_beside, told
+from .rivals import implausible
+from .track import Track
+
+__all__ = ["reconsidered"]
+
+_PRICE = 4.0  # statistical, nats a parameter: half the logarithm of some thousand independent values (Schwarz's criterion)
+_CLEARLY = 3.0  # statistical, nats: odds of twenty to one; a move that gains less isn't made
+_LAWS = 2  # of the best by themselves, that are also tried with each other term taken away
+_MOVES = 20  # at most: each one gains, so that the search ends anyway
+_FACTORS = (0.25, 4.0)  # by which values that are not linear are moved, from which everything is fitted again
+_ROUGHLY = 5  # iterations of such a fit before it is worth more
+
+
+@dataclass(eq=False)
+class _Search:
+    track: Track
+    begin: State
+    state: State
+    own: frozenset[str]
+    tell: Callable[[str], None]
+
+    def score(self, state: State) -> float:
+        """Log likelihood of unseen blocks, less the price of the structure [nats]."""
+        left, model = state.left, state.fit.model
+        if not math.isfinite(left) or left <= 0.0:
+            return -math.inf
+        price = _PRICE * sum(not p.declaration.shape for p in model.parameters())
+        off = max(implausible(self.track.masses, model) - implausible(self.track.masses, self.begin.fit.model), 0.0)
+        return -0.5 * self.track.independent * (math.log(left / self.begin.left) + off) - price
+
+    @property
+    def brought(self) -> list[int]:
+        """Places of the terms that may go again."""
+        return [k for k, held in enumerate(self.state.fit.model.terms) if held.effect.key not in self.own]
+
+    def taken(self, made: Iterable[tuple[str, State]]) -> bool:
+        """Whether the best of the moves is clearly better, and then is where the search goes on."""
+        best = max(made, key=lambda each: self.score(each[1]), default=None)
+        if best is None or self.score(best[1]) <= self.score(self.state) + _CLEARLY:
+            return False
+        self.tell(f"{best[0]}: better by {self.score(best[1]) - self.score(self.state):.0f} nats")
+        self.state = best[1]
+        return True
+
+    def without_each(self, state: State, but: int | None = None) -> list[tuple[str, State]]:
+        """``state`` with each brought term taken away but that at the place ``but``, everything else fitted anew."""
+        model = state.fit.model
+        return [
+            (f"without {model.terms[k].effect.title}", refit(self.track, without_term(model, model.terms[k].effect.id)))
+            for k in self.brought
+            if k != but
+        ]
+
+    def elsewhere(self) -> list[tuple[str, State]]:
+        """The same structure from other values of what isn't linear: what sticks or gives way makes one valley for each."""
+        state = self.state
+        bounds = bounds_of(state.fit.model, scales_of(self.track))
+        best = float(state.fit.residual @ state.fit.residual), state.fit.model
+        for name, value in self._moved(state.fit.model):
+            low, high = bounds.get(name, (-math.inf, math.inf))
+            if low < value < high:
+                start = state.fit.model.with_value(name, value)
+                fit = self.track.fit(start, state.fit.names, _ROUGHLY, bounds)
+                best = min(best, (float(fit.residual @ fit.residual), fit.model), key=lambda each: each[0])
+        return [] if best[1] is state.fit.model else [("from other values", refit(self.track, best[1]))]
+
+    def _moved(self, model: Model) -> list[tuple[str, float]]:
+        """Names of values that are not linear, each with another value."""
+        return [
+            (f"{model.prefixes[k]}.{p.name}", value * factor)
+            for k in self.brought
+            for p, value in zip(model.terms[k].effect.parameters, model.terms[k].values, strict=True)
+            if not p.linear and not p.shape and p.name != "period" and value != 0.0
+            for factor in _FACTORS
+        ]
+
+    def other_laws(self) -> list[tuple[str, State]]:
+        """Each term by each other law of its effect; the best of these also with each other term taken away.
+
+        A law that is the wrong one may need a further term that mends it: neither move gains without the other.
+        """
+        model, scales = self.state.fit.model, scales_of(self.track)
+        made: list[tuple[str, int, State]] = []
+        for k in self.brought:
+            for law in laws_beside(model.terms[k], scales):
+                terms: list[Term] = [law if k == place else held for place, held in enumerate(model.terms)]
+                state = refit(self.track, model.with_terms(terms))
+                if told(state.fit.model.terms[k], scales):
+                    made.append((f"{law.effect.title} by another law ({law.effect.law})", k, state))
+        made.sort(key=lambda each: -self.score(each[2]))
+        fewer = [(f"{what}, {which}", state) for what, k, whole in made[:_LAWS] for which, state in self.without_each(whole, k)]
+        return [*((what, state) for what, _, state in made), *fewer]
+
+
+def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str], None]) -> State:
+    """The best structure that moves from ``state`` come to.
+
+    Args:
+        track: the recordings, as one observer follows them.
+        begin: the fitted nominal model, whose terms stay.
+        state: a fitted model with all of its terms and more.
+        tell: told what is done.
+    """
+    own = frozenset(held.effect.key for held in begin.fit.model.terms)
+    search = _Search(track, begin, state, own, tell)
+    for _ in range(_MOVES):
+        if search.taken(search.without_each(search.state)):
+            continue
+        if search.state.excess < NOTHING * search.state.floor:
+            break
+        if not (search.taken(search.elsewhere()) or search.taken(search.other_laws())):
+            break
+    return search.state

@@ -1,0 +1,100 @@
+"""How sure each effect is there, whatever else stays unexplained: found alone in halves of the recordings, beside its rivals.
+
+The grown model is fitted to one half of the recordings with a term and without it, everything else fitted anew, and both are
+judged on the other half; and the other way round. What is there takes its part off either half. So the smaller of the two
+differences counts, as the logarithm of a likelihood ratio of so many values as what stays unexplained leaves independent:
+the more stays, and the longer it hangs together, the less sure is anything beside it. A rival fitted in full shares the
+probability by Bayes' rule.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Model
+from ..record import Array
+from .additive.residual import independent_share
+from .candidates import scales_of
+from .fitting import bounds_of, free_names, without_term
+from .settle import Step
+from .track import Track
+
+__all__ = ["Half", "Presence", "presences"]
+
+_A_LITTLE = 0.1  # of a residual of the half that is judged on: it says what the other one tells hardly at all
+_ITERATIONS = 6
+_EVEN = 3.0  # statistical, nats: odds of twenty to one weigh up that one effect among twenty is there
+_STEEP = 1.5  # statistical, nats: by so much what is missing differs from the noise that the likelihood supposes
+_MOST = 0.98  # of all that was as sure, some came from physics that belongs to no law
+
+
+@dataclass(frozen=True)
+class Half:
+    """What one half of the recordings says of an effect by itself.
+
+    Attributes:
+        nats: logarithm of the likelihood ratio on the other half, with the effect over without it.
+        parameters: of the effect, by name, as this half alone tells them [SI].
+    """
+
+    nats: float
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Presence:
+    """How sure an effect is there.
+
+    Attributes:
+        probability: that it is, and not one of its rivals.
+        halves: each by itself.
+    """
+
+    probability: float
+    halves: tuple[Half, Half]
+
+
+def presences(track: Track, end: Model, steps: Sequence[Step]) -> dict[str, Presence]:
+    """How sure each term of the grown model ``end`` is there, by the name of the term."""
+    left = track.residual(end)
+    n = left.shape[0]
+    # What an observer sees is smooth over its time constant: the correlation is reckoned from rows that far apart.
+    apart = max(round(1.0 / (track.bandwidth * min(run.sample_time for run in track.runs))), 1)
+    independent = independent_share(left[::apart]) * n / apart
+    first = (np.arange(n) * 4 // n) % 2 == 0
+    with_all = [_on_other(track, end, rows) for rows in (first, ~first)]
+    found = {}
+    for step in steps:
+        without = without_term(end, step.term.split("#")[0])
+        halves = []
+        for rows, (fitted, lacks) in zip((first, ~first), with_all, strict=True):
+            nats = 0.25 * independent * math.log(max(_on_other(track, without, rows)[1], 1e-300) / max(lacks, 1e-300))
+            own = {p.name: p.value for p in fitted.parameters() if p.name.startswith(f"{step.term}.")}
+            halves.append(Half(nats, own))
+        least = min(each.nats for each in halves)
+        there = 1.0 / (1.0 + math.exp(-min(max((least - _EVEN) / _STEEP, -50.0), 50.0)))
+        sure = min(there * _among_rivals(step, independent), _MOST)
+        found[step.term] = Presence(round(sure, 4), (halves[0], halves[1]))
+    return found
+
+
+def _on_other(track: Track, model: Model, rows: Array) -> tuple[Model, float]:
+    """``model`` fitted to the half ``rows``, and the sum of squares that it lacks in the other one [F^2]."""
+    weights = np.where(rows, 1.0, _A_LITTLE)
+    fitted = track.fit(model, free_names(model), _ITERATIONS, bounds_of(model, scales_of(track)), weights).model
+    return fitted, float(np.sum(track.residual(fitted)[~rows] ** 2))
+
+
+def _among_rivals(step: Step, independent: float) -> float:
+    """Probability of the effect of ``step`` among itself and what was fitted in its place."""
+    own = step.term.split("#")[0]
+    best: dict[str, float] = {}
+    for rival in step.rivals:
+        if own not in {name.split("#")[0] for name in rival.names}:
+            best[rival.effect.id] = min(rival.left, best.get(rival.effect.id, math.inf))
+    odds = [-0.5 * independent * math.log(max(left, 1e-300) / max(step.after, 1e-300)) for left in best.values()]
+    return 1.0 / (1.0 + sum(math.exp(min(each, 50.0)) for each in odds))
