@@ -35,6 +35,7 @@ from .fitting import best_track, bounds_of, refit
 from .grow import Growth, by_parts, grow, helped, with_moves, without_nothings
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
+from .limits import limits_of
 from .locate import Where, locate, moved_back, steady
 from .other_laws import strained
 from .presence import Presence, presences
@@ -93,6 +94,8 @@ _UNDECIDED = 0.45  # confidence at most, where no parameter of an effect is as l
 _STILL = 12.0  # times the noise of a position, that hardly any sample of an hour is off by to either side
 _FLICKERS = 3  # values
 _LOOKED_AT = 2000  # samples
+_RESAMPLED = 20  # blocks, each longer than what is left hangs together
+_DRAWS = 1000  # of them, with replacement
 _PASSES = 0.05  # of the force's energy: what lets less pass to the body doesn't move it by this force
 _LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that moves the body
 
@@ -360,6 +363,7 @@ def _concluded(
             findings = [nobody, *_beside(presences(track, end, growth.steps), findings, growth.steps)]
     everything = None if alone is None else unexplained.where
     if missing:
+        unexplained = replace(unexplained, interval=_interval(unexplained.share, left, floor))
         energy = _difference(fast, begin, end)
         if remains is not None:
             energy = [explained + left_over for explained, left_over in zip(energy, remains, strict=True)]
@@ -386,6 +390,9 @@ def _concluded(
         bandwidth=held.bandwidth,
         grown=_grown(growth),
         only_held_back=alone is not None,
+        limits=limits_of(growth.track, growth.end, growth.last, end.units),
+        fitted_on=tuple(record.source for record in train),
+        tested_on=tuple(record.source for record in validation),
     )
 
 
@@ -506,6 +513,17 @@ def _floor(held: Track, begin: Model, end: Model, lacking: Array) -> list[Array]
     if end is begin or float(np.median([each @ each for each in own])) < _DECIDED * float(lacking @ lacking):
         return own
     return min(own, [held.residual(begin, twin) for twin in twins(held, begin, _TWINS)], key=_mean_square)
+
+
+def _interval(share: float, left: Mapping[str, Array], floor: Sequence[Array]) -> tuple[float, float]:
+    """95 % of the ``share`` that is left, by resampling blocks of the recordings held back."""
+    blocks = [np.array_split(each, _RESAMPLED) for each in (left["augmented"], left["refit"])]
+    chance = np.mean([[float(part @ part) for part in np.array_split(each, _RESAMPLED)] for each in floor], axis=0)
+    end, begin = (np.array([float(part @ part) for part in parts]) - chance for parts in blocks)
+    drawn = np.random.default_rng(0).integers(0, _RESAMPLED, (_DRAWS, _RESAMPLED))
+    shares = np.clip(np.sum(end[drawn], axis=1) / np.maximum(np.sum(begin[drawn], axis=1), 1e-300), 0.0, 1.0)
+    low, high = (float(each) for each in np.quantile(shares, [0.025, 0.975]))
+    return min(low, share), max(high, share)
 
 
 def _mean_square(residuals: Sequence[Array]) -> float:

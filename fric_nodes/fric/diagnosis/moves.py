@@ -18,6 +18,7 @@ from .candidates import scales_of
 from .fitting import NOTHING, State, bounds_of, refit, without_term
 from .other_laws import laws_beside, told
 from .rivals import implausible
+from .settle import TO_STAY
 from .track import Track
 
 __all__ = ["reconsidered"]
@@ -53,9 +54,15 @@ class _Search:
         return [k for k, held in enumerate(self.state.fit.model.terms) if held.effect.key not in self.own]
 
     def taken(self, made: Iterable[tuple[str, State]]) -> bool:
-        """Whether the best of the moves is clearly better, and then is where the search goes on."""
+        """Whether the best of the moves is clearly better, and then is where the search goes on.
+
+        What doesn't make the structure smaller must take off a real part of what was missing, too.
+        """
         best = max(made, key=lambda each: self.score(each[1]), default=None)
         if best is None or self.score(best[1]) <= self.score(self.state) + _CLEARLY:
+            return False
+        smaller = len(best[1].fit.model.terms) < len(self.state.fit.model.terms)
+        if not smaller and self.state.left - best[1].left < TO_STAY * self.begin.excess:
             return False
         self.tell(f"{best[0]}: better by {self.score(best[1]) - self.score(self.state):.0f} nats")
         self.state = best[1]

@@ -14,9 +14,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..model import Model
-from ..record import Array
 from .additive.residual import independent_share
 from .candidates import scales_of
 from .fitting import bounds_of, free_names, without_term
@@ -82,7 +82,7 @@ def presences(track: Track, end: Model, steps: Sequence[Step]) -> dict[str, Pres
     return found
 
 
-def _on_other(track: Track, model: Model, rows: Array) -> tuple[Model, float]:
+def _on_other(track: Track, model: Model, rows: NDArray[np.bool_]) -> tuple[Model, float]:
     """``model`` fitted to the half ``rows``, and the sum of squares that it lacks in the other one [F^2]."""
     weights = np.where(rows, 1.0, _A_LITTLE)
     fitted = track.fit(model, free_names(model), _ITERATIONS, bounds_of(model, scales_of(track)), weights).model

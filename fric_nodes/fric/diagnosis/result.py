@@ -14,6 +14,7 @@ from ..model import Model
 from ..record import Array
 from .additive.told import ComponentFinding
 from .confidence import AS_LIKELY, FAINT
+from .limits import Limit
 from .locate import Where
 from .presence import Half
 
@@ -132,10 +133,17 @@ class Validation:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Share of the mismatch's energy that is left, and where it sits; None when it isn't above the floor."""
+    """What is left.
+
+    Attributes:
+        share: of the mismatch's energy.
+        where: it sits; None when it isn't above the floor.
+        interval: 95 % of it by resampling blocks of the recordings held back; None where none can be had.
+    """
 
     share: float
     where: Where | None
+    interval: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +183,9 @@ class Diagnosis:
         by_means: True where means of runs at constant speeds were compared, not samples.
         components: what the grown model still lacks, by component of the machine, in the recordings learnt from; empty where
             nothing unknown is left.
+        limits: of every effect that was not found, the smallest that would have shown in the recordings learnt from.
+        fitted_on: sources of the recordings learnt from.
+        tested_on: of those held back.
     """
 
     mismatch: bool
@@ -196,6 +207,15 @@ class Diagnosis:
     only_held_back: bool = False
     by_means: bool = False
     components: tuple[ComponentFinding, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    fitted_on: tuple[str, ...] = ()
+    tested_on: tuple[str, ...] = ()
+
+    @property
+    def limits_in_words(self) -> str:
+        """What would have shown; empty where no limit is known."""
+        known = [each.sentence for each in self.limits if each.size is not None]
+        return f"Not found, but would have shown in these recordings: {listed(known)}." if known else ""
 
     @property
     def sentence(self) -> str:
@@ -292,7 +312,29 @@ class Diagnosis:
                 "force_error_refit": errors[0],
                 "force_error_augmented": errors[1],
             },
-            "unexplained": {"share": self.unexplained.share, "where": _where(self.unexplained.where)},
+            "unexplained": {
+                "share": self.unexplained.share,
+                "interval": None if self.unexplained.interval is None else list(self.unexplained.interval),
+                "where": _where(self.unexplained.where),
+                "components": {each.component: each.share for each in self.components if each.is_there},
+            },
+            "limits": [
+                {
+                    "effect": each.effect,
+                    "parameter": each.parameter,
+                    "size": each.size,
+                    "softer": each.softer,
+                    "unit": each.unit,
+                    "why": each.why,
+                }
+                for each in self.limits
+            ],
+            "data": {
+                "fitted": list(self.fitted_on),
+                "selected": "blocks and halves of the fitted recordings, each left out in turn",
+                "tested": list(self.tested_on),
+                "withdrawn": "what makes the tested recordings worse, or does not show there; nothing else is decided on them",
+            },
             "components": [each.as_json() for each in self.components],
             "next_experiment": self.next_experiment,
             "notes": list(self.notes),

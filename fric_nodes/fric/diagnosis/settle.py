@@ -16,9 +16,22 @@ from .track import Track, Twin
 from .twin import twins
 from .universe import worth_trying
 
-__all__ = ["CLEARLY", "FLOOR_KNOWN", "NEARLY_ALL", "Settled", "Step", "audit", "exchanged", "is_nothing", "merged", "settled"]
+__all__ = [
+    "CLEARLY",
+    "FLOOR_KNOWN",
+    "NEARLY_ALL",
+    "TO_STAY",
+    "Settled",
+    "Step",
+    "audit",
+    "exchanged",
+    "is_nothing",
+    "merged",
+    "settled",
+]
 
-_TO_STAY = 0.004  # of what is missing at the start, beside all other terms
+TO_STAY = 0.004
+"""Statistical, of what is missing at the start: less is no gain beside all other terms."""
 NEARLY_ALL = 0.9  # of what little is left: what takes that is an effect, and not what laws that differ in form leave,
 CLEARLY = 3.0  # if it is more than so many floors
 _AUDITED = 0.04  # of what is missing: with more left, it is looked at whether halves of the recordings tell the parameters
@@ -125,7 +138,7 @@ def merged(track: Track, begin: State, state: State, steps: list[Step]) -> tuple
         return state, steps
     others = [held for held in state.fit.model.terms if held not in transmission]
     one = refit(track, state.fit.model.with_terms([*others, Term(effect, tuple(effect.values(given)))]))
-    if one.left - state.left > max(OF_FLOOR * state.floor, _TO_STAY * begin.excess):
+    if one.left - state.left > max(OF_FLOOR * state.floor, TO_STAY * begin.excess):
         return state, steps
     gone = {held.effect.id for held in transmission}
     old = [step for step in steps if step.term.split("#")[0] in gone]
@@ -198,7 +211,7 @@ def _takes_its_place(track: Track, begin: State, without: State, state: State, o
     more = max(dearer, 0.0) * max(begin.excess - without.excess, 0.0)
     # Twins that stick and slip each in its own way leave more than a recording does: no floor is higher than what is left.
     floor = min(state.floor, state.left, rival.left)
-    return own - rival.score - more > max(OF_FLOOR * floor, _TO_STAY * without.excess)
+    return own - rival.score - more > max(OF_FLOOR * floor, TO_STAY * without.excess)
 
 
 def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scales: Scales) -> tuple[State, list[Step]]:
@@ -252,7 +265,7 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
             dearer = implausible(track.masses, without.fit.model) - implausible(track.masses, state.fit.model)
             lost = without.left - state.left + begin.excess * max(dearer, 0.0)
             alone = lost > NEARLY_ALL * without.excess and without.excess > CLEARLY * without.floor
-            little = OF_FLOOR * state.floor if alone else max(OF_FLOOR * state.floor, _TO_STAY * begin.excess)
+            little = OF_FLOOR * state.floor if alone else max(OF_FLOOR * state.floor, TO_STAY * begin.excess)
             if nothing or lost < little:
                 why = "comes out at nothing" if nothing else "not needed any more"
                 left_out.append((-math.inf if nothing else lost, without, step, f"{why} beside the other terms"))

@@ -99,6 +99,7 @@ class Diagnosed:
             found.force_errors_in_words,
             *(f"- {each.evidence}; {each.component}; {each.where.regime}" for each in found.findings),
             *(f"- {each.sentence(found.given.units.force)}" for each in found.components if each.is_there),
+            found.limits_in_words,
             *(f"- instrument: {check.detail}; {check.remedy}" for check in faults),
             *(f"- {note}" for note in found.notes),
             f"next: {found.next_experiment}",

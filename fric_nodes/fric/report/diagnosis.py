@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import plotly.graph_objects as go
 
+from ..diagnosis.limits import EVIDENCE
 from ..diagnosis.result import Diagnosis, Finding, Prediction
 from ..diagnosis.track import smooth
 from ..model_file import model_to_text
@@ -63,6 +64,8 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
     sections += [_finding_section(each, k) for k, each in enumerate(found.findings)]
     if found.components:
         sections.append(_components_section(found))
+    if found.limits:
+        sections.append(_limits_section(found))
     sections += [_growth_section(found), _candidates_section(found), _parameters_section(found), _rest_section(found)]
     if found.checks:
         sections.append(checks_section(found.checks, [record.source for record in train]))
@@ -249,6 +252,25 @@ def _components_section(found: Diagnosis) -> Section:
     )
 
 
+def _limits_section(found: Diagnosis) -> Section:
+    """How large what was not found would have to be."""
+    rows = [
+        (
+            each.title,
+            "" if each.size is None else f"{'below' if each.softer else 'above'} {significant(each.size, 2)} {each.unit}",
+            each.parameter,
+            each.why,
+        )
+        for each in found.limits
+    ]
+    note = (
+        "The size at which an effect that was not found would have raised the log likelihood of these recordings by "
+        f"{EVIDENCE:g} nats, at first order, beside everything that the model has. Smaller ones may be there."
+    )
+    head = ("effect", "would have shown", "parameter", "or why not")
+    return Section("Detection limits", (table(head, rows, text_columns=(0, 1, 2, 3), wrap=(3,)), paragraph(note, "note")))
+
+
 def _growth_section(found: Diagnosis) -> Section:
     rows = [
         (f"with {each.term}" if each.term else "refitted nominal", f"{100 * each.left:.3g} %", each.beside)
@@ -293,7 +315,10 @@ def _rest_section(found: Diagnosis) -> Section:
     if rest.where is None:
         text = "Nothing is left above the noise of the instruments."
     else:
-        text = f"{100 * rest.share:.3g} % of the missing force's energy is left, mostly at: {rest.where.regime}."
+        within = ""
+        if rest.interval is not None:
+            within = f" (95 %: {100 * rest.interval[0]:.2g} to {100 * rest.interval[1]:.2g} %)"
+        text = f"{100 * rest.share:.3g} % of the missing force's energy is left{within}, mostly at: {rest.where.regime}."
     return Section(
         "What is left, and what to record next", (paragraph(text), paragraph(f"Next experiment: {found.next_experiment}."))
     )

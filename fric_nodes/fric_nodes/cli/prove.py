@@ -1,12 +1,14 @@
-"""``fric prove``: measure how often the diagnosis is right, on simulated axes whose true physics is kept from it."""
+"""``fric prove``: measure how often the diagnosis is right, on simulated axes or on recordings of one's own."""
 
 from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import Annotated
 
 import typer
+from fric.errors import InputError
 
 from .options import JsonOption, OutOption, progress
 
@@ -31,9 +33,23 @@ def prove(
         ),
     ] = "standard",
     jobs: Annotated[int | None, typer.Option("--jobs", help="Number of processes. If not given: one per core.")] = None,
+    inject: Annotated[
+        list[Path] | None,
+        typer.Option("--inject", help="Conceal effects in this recording instead of simulated axes. May be repeated."),
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", help="With --inject: the model that the diagnosis starts from.")
+    ] = None,
+    sizes: Annotated[
+        str, typer.Option("--sizes", help="With --inject: sizes, as multiples of the force that stays unexplained.")
+    ] = "3,6",
+    only: Annotated[str, typer.Option("--only", help="With --inject: effects, separated by commas. If not given: all.")] = "",
     as_json: JsonOption = False,
 ) -> None:
     """Measure how often the diagnosis is right; exit status 1 when a goal is missed. A stopped run continues in its folder."""
+    if inject or model is not None:
+        _inject(inject or [], model, sizes, only, out, as_json)
+        return
     from fric.diagnosis.prove.examination import hold
     from fric.files import write_text
     from fric.report.prove import prove_page
@@ -78,3 +94,60 @@ def prove(
         typer.echo(f"written: {out / 'index.html'}")
     if held.score.missed:
         raise typer.Exit(1)
+
+
+_BLOCKS = 10
+
+
+def _inject(recordings: list[Path], model: Path | None, sizes: str, only: str, out: Path, as_json: bool) -> None:
+    """Effects concealed in recordings; the page and ``injection.json`` go into ``out``."""
+    import fric
+    from fric.diagnosis.prove.injection import examined, injections
+    from fric.files import write_text
+    from fric.model_file import read_model
+    from fric.report.injection import injection_page
+
+    if model is None or not recordings:
+        raise InputError(
+            "--inject" if model is None else "--model", "needs the other of the two", "give --inject BAG --model M"
+        )
+    try:
+        wanted = [float(each) for each in sizes.split(",")]
+    except ValueError:
+        wanted = []
+    if not wanted or not all(math.isfinite(each) and each > 0.0 for each in wanted):
+        raise InputError("--sizes", f"'{sizes}' isn't a list of numbers above 0", "give for example --sizes 3,6")
+    names = [each for each in only.split(",") if each]
+    known = {each.effect for each in injections(wanted)}
+    if set(names) - known:
+        raise InputError(
+            "--only", f"'{', '.join(sorted(set(names) - known))}' can't be injected", f"one of {', '.join(sorted(known))}"
+        )
+    records = [fric.read(each) for each in recordings]
+    bare, outcomes = examined(records, read_model(model), wanted, _BLOCKS, progress, names)
+    command = f"fric prove {' '.join(f'--inject {each.name}' for each in recordings)} --model {model.name} --out {out.name}"
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / "injection.html", injection_page(bare, outcomes, command))
+    result = {
+        "found": sum(each.found for each in outcomes),
+        "of": len(outcomes),
+        "with_wrong_names": sum(bool(each.wrong) for each in outcomes),
+        "outcomes": [
+            {
+                "effect": each.what.effect,
+                "times": each.what.times,
+                "rms": each.rms,
+                "presence": each.presence,
+                "wrong": list(each.wrong),
+            }
+            for each in outcomes
+        ],
+    }
+    write_text(out / "injection.json", json.dumps(result, indent=1))
+    if as_json:
+        typer.echo(json.dumps(result))
+        return
+    typer.echo(
+        f"{result['found']} of {len(outcomes)} concealed effects found; in {result['with_wrong_names']} another was named"
+    )
+    typer.echo(f"written: {out / 'injection.html'}")

@@ -1,0 +1,153 @@
+"""How large an effect that was not found would have to be, for these recordings to show it.
+
+An effect of the strength A changes the missing force, at first order, by A c, with c its column on the observer. What the
+fitted parameters can do themselves is taken out of c; E is the energy of the rest and L that of what the model leaves. With N
+independent values the log likelihood would rise by (N / 2) ln(1 + A^2 E / L). The limit is the A at which that is
+:data:`EVIDENCE`: at one and a half of it most such effects are found, at half of it hardly any.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effect import Effect
+from ..effects import EFFECTS
+from ..model import ModelError, Term
+from ..record import Array, Units
+from .additive.residual import independent_share
+from .fitting import State
+from .screen import Column, Tried
+from .track import Track
+
+__all__ = ["EVIDENCE", "Limit", "limits_of"]
+
+EVIDENCE = 10.0
+"""Statistical [nats]: what a term must gain on unseen blocks to be more than chance among some hundred trials."""
+
+_OWN = 0.02  # statistical, of a column's energy: with less left, the fitted parameters are the effect by other names
+_NEAR = 1.3  # numerical: so near to the limit the change is about proportional to the size
+_STEP = 30.0  # numerical: of one step towards the limit
+_ROUNDS = 8  # numerical
+_THE_SAME = "the fitted parameters do the same on these motions"
+_TINY = 1e-12  # numerical
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What would have shown of one effect.
+
+    Attributes:
+        effect: id of the vocabulary.
+        title: in a sentence.
+        parameter: that says how strong it is; empty where no size can be stated.
+        size: the smallest that would have been found, or, where ``softer``, the largest stiffness [SI].
+        softer: True where the effect grows as the parameter falls, as with a stiffness in series.
+        unit: of the size.
+        why: no size can be stated; empty where one is.
+    """
+
+    effect: str
+    title: str
+    parameter: str
+    size: float | None
+    softer: bool
+    unit: str
+    why: str
+
+    @property
+    def sentence(self) -> str:
+        """In one phrase."""
+        if self.size is None:
+            return f"{self.title}: {self.why}"
+        size = f"{self.size:.2g}" if self.unit == "1" else f"{self.size:.2g} {self.unit}"
+        return f"{self.title} {'below' if self.softer else 'above'} {size} ({self.parameter})"
+
+
+def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units) -> tuple[Limit, ...]:
+    """The limit of every effect that ``state`` has not, by name.
+
+    Args:
+        track: the recordings learnt from.
+        state: the model that was found, fitted.
+        tried: every candidate beside it at first order.
+        units: of the model.
+    """
+    residual = state.fit.residual
+    n = residual.shape[0]
+    apart = max(round(1.0 / (track.bandwidth * min(run.sample_time for run in track.runs))), 1)
+    independent = independent_share(residual[::apart]) * n / apart
+    energy = math.expm1(min(2.0 * EVIDENCE / max(independent, 1.0), 50.0)) * float(residual @ residual)
+    basis, _ = np.linalg.qr(state.fit.jacobian / np.maximum(np.linalg.norm(state.fit.jacobian, axis=0), 1e-300))
+    there = {held.effect.id for held in state.fit.model.terms}
+    by_effect = {each.column.term.effect.id: each.column for each in tried if each.column.parts[0].shape[0] == n}
+    search = _Search(track, state, basis, energy, units)
+    found = []
+    for name, effect in sorted({effect.id: effect for effect in EFFECTS.values()}.items()):
+        if name not in there:
+            column = by_effect.get(name)
+            if column is None:
+                found.append(_none(effect, "these recordings hold nothing by which it could show"))
+            else:
+                found.append(search.linear(column) if column.amplitudes else search.whole(column))
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What a limit is found with: ``basis`` spans what the fitted parameters do, ``energy`` [F^2] is to be brought."""
+
+    track: Track
+    state: State
+    basis: Array
+    energy: float
+    units: Units
+
+    def needed(self, column: Array) -> float | None:
+        """By what a column has to be multiplied; None where the fitted parameters do the same."""
+        beside = column - self.basis @ (self.basis.T @ column)
+        own = float(beside @ beside)
+        return None if own <= max(_OWN * float(column @ column), _TINY) else math.sqrt(self.energy / own)
+
+    def linear(self, column: Column) -> Limit:
+        """Of an effect whose force grows in proportion to its amplitude."""
+        effect = column.term.effect
+        needed = self.needed(column.parts[0])
+        if needed is None:
+            return _none(effect, _THE_SAME)
+        declared = next(p for p in effect.parameters if p.name == column.amplitudes[0])
+        return Limit(effect.id, effect.title, declared.name, needed, False, declared.unit(self.units), "")
+
+    def whole(self, column: Column) -> Limit:
+        """Of an effect with another strength: from the size that was tried to the one at which its own column is enough."""
+        held = column.term
+        names = [p.name for p in held.effect.parameters]
+        at = names.index((held.effect.amplitudes or tuple(names))[0])
+        declared, value, change = held.effect.parameters[at], held.values[at], column.parts[0]
+        if declared.dimension == "F" and held.effect.neutral is None:
+            return _none(held.effect, "shows only where the command goes beyond it")
+        softer = declared.dimension in ("F/x", "1/s")
+        needed = self.needed(change)
+        for _ in range(_ROUNDS):
+            if needed is None or not math.isfinite(needed) or value == 0.0:
+                return _none(held.effect, _THE_SAME)
+            if 1.0 / _NEAR < needed < _NEAR:
+                size = value / needed if softer else value * needed
+                return Limit(held.effect.id, held.effect.title, declared.name, size, softer, declared.unit(self.units), "")
+            by = min(max(needed, 1.0 / _STEP), _STEP)
+            value = value / by if softer else value * by
+            values = tuple(value if k == at else each for k, each in enumerate(held.values))
+            model = self.state.fit.model
+            try:
+                grown = model.with_terms((*model.terms, Term(held.effect, values)))
+            except ModelError:
+                break
+            needed = self.needed(self.track.residual(grown) - self.state.fit.residual)
+        return _none(held.effect, "no size was found at which it begins to show")
+
+
+def _none(effect: Effect, why: str) -> Limit:
+    return Limit(effect.id, effect.title, "", None, False, "", why)

@@ -1,0 +1,189 @@
+"""Effects concealed in recordings of a real axis: the diagnosis examined on its own motions, noise and unknown physics.
+
+A force that opposes the motion more than it did needs that much more effort for the same motion, exactly: what is added to the
+recorded effort is a law of the measured motion, and nothing of the recording's own dirt is lost. A delay of the drive is the
+recorded effort ahead of its time. The recording as it is stands beside: what is found there is the axis's own and counts
+neither way.
+
+The size of an effect is a multiple of what the grown model of the recording as it is leaves unexplained, as root mean square of
+the added force where it acts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from ...model import Model
+from ...record import Array, Record
+from ..blocks import in_blocks
+from ..confidence import AS_LIKELY
+from ..diagnose import diagnose
+from ..result import Diagnosis
+
+__all__ = ["INJECTED", "Injected", "InjectionOutcome", "examined", "injected", "injections"]
+
+_CUTOFF = 40.0  # physical [Hz]: where axes' friction changes with their motion
+_REST = 0.01  # physical, of fast motion: below, the axis may rest, where friction balances whatever is left
+_FAST = 0.98  # statistical: quantile of the speed that is fast motion
+_ACTS = 0.05  # of its largest value: where an added force is less it does not act
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Measured motion of one recording: position [x], velocity [x/s], sign of it (0 where it may rest), time [s], ``(n,)``."""
+
+    position: Array
+    velocity: Array
+    sign: Array
+    time: Array
+    fast: float
+    low: float
+    high: float
+
+
+def _bump(s: Motion) -> Array:
+    middle, width = 0.5 * (s.low + s.high), 0.1 * (s.high - s.low)
+    return np.exp(-0.5 * ((s.position - middle) / width) ** 2) * s.sign
+
+
+INJECTED: dict[str, Callable[[Motion], Array]] = {
+    "asymmetry": lambda s: np.abs(s.sign),
+    "stribeck": lambda s: np.exp(-np.abs(s.velocity) / (0.05 * s.fast)) * s.sign,
+    "quadratic_drag": lambda s: s.velocity * np.abs(s.velocity) / s.fast**2,
+    "ripple": lambda s: np.sin(2.0 * np.pi * s.position / (0.037 * (s.high - s.low))),
+    "position_dependence": _bump,
+    "stiffness": lambda s: (s.position - s.low) / (s.high - s.low),
+    "nonlinear_stiffness": lambda s: ((s.position - 0.5 * (s.low + s.high)) / (s.high - s.low)) ** 3,
+    "time_drift": lambda s: (s.time - s.time[0]) / (s.time[-1] - s.time[0]) * s.sign,
+}
+"""Forces along the motion, of the size of one, by the effect of the vocabulary that they are."""
+
+_DELAY = "delay"
+
+
+@dataclass(frozen=True)
+class Injected:
+    """One effect and how large it was made.
+
+    Attributes:
+        effect: id of the vocabulary.
+        times: what stays unexplained in the recording as it is.
+    """
+
+    effect: str
+    times: float
+
+
+@dataclass(frozen=True)
+class InjectionOutcome:
+    """What the diagnosis said of one.
+
+    Attributes:
+        what: was injected.
+        rms: root mean square of the added force where it acts [F].
+        presence: of the injected effect; 0 where it isn't named.
+        wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor the axis's own.
+    """
+
+    what: Injected
+    rms: float
+    presence: float
+    wrong: tuple[str, ...]
+
+    @property
+    def found(self) -> bool:
+        """True where it is named as more likely there than not."""
+        return self.presence >= AS_LIKELY
+
+
+def injections(sizes: Sequence[float]) -> list[Injected]:
+    """Every effect in every size."""
+    return [Injected(effect, size) for effect in (*INJECTED, _DELAY) for size in sizes]
+
+
+def injected(records: Sequence[Record], what: Injected, rest: float) -> tuple[list[Record], float]:
+    """``records`` with the effect concealed in their effort, and the root mean square of what was added where it acts [F].
+
+    Args:
+        records: of one axis.
+        what: to conceal.
+        rest: root mean square of the force that stays unexplained in them as they are [F].
+    """
+    motions = [_motion(record) for record in records]
+    fast = float(np.quantile(np.abs(np.concatenate([each.velocity for each in motions])), _FAST))
+    low = min(float(np.min(each.position)) for each in motions)
+    high = max(float(np.max(each.position)) for each in motions)
+    made = []
+    for record, each in zip(records, motions, strict=True):
+        sign = np.where(np.abs(each.velocity) > _REST * fast, np.sign(each.velocity), 0.0)
+        motion = replace(each, sign=sign, fast=fast, low=low, high=high)
+        made.append(_later(record) if what.effect == _DELAY else INJECTED[what.effect](motion))
+    joined = np.concatenate(made)
+    acts = np.abs(joined) > _ACTS * float(np.max(np.abs(joined)))
+    size = what.times * rest / float(np.sqrt(np.mean(joined[acts] ** 2)))
+    changed = []
+    for record, force in zip(records, made, strict=True):
+        if what.effect == _DELAY:
+            effort = np.interp(record.time + size * record.sample_time, record.time, record.effort)
+        else:
+            effort = record.effort + size * force
+        changed.append(replace(record, effort=effort))
+    return changed, what.times * rest
+
+
+def examined(
+    records: Sequence[Record],
+    nominal: Model,
+    sizes: Sequence[float],
+    n_blocks: int,
+    progress: Callable[[str], None],
+    only: Sequence[str] = (),
+) -> tuple[Diagnosis, list[InjectionOutcome]]:
+    """The diagnosis of ``records`` as they are, and of every injection into them.
+
+    Args:
+        records: of one axis.
+        nominal: what the diagnosis starts from.
+        sizes: multiples of what stays unexplained.
+        n_blocks: into which each recording is cut, every other one held back.
+        progress: told what goes on.
+        only: effects; none are all.
+    """
+    progress("diagnosing the recordings as they are")
+    bare = diagnose(*in_blocks(records, n_blocks), nominal)
+    own = {each.effect for each in bare.findings if each.confidence >= AS_LIKELY}
+    errors = bare.force_errors
+    rest = errors[1] if errors is not None else 0.0
+    outcomes = []
+    for what in injections(sizes):
+        if only and what.effect not in only:
+            continue
+        changed, rms = injected(records, what, rest)
+        found = diagnose(*in_blocks(changed, n_blocks), nominal)
+        sure = {each.effect: each.confidence for each in found.findings}
+        wrong = tuple(sorted(e for e, c in sure.items() if c >= AS_LIKELY and e not in {what.effect, "unknown", *own}))
+        outcomes.append(InjectionOutcome(what, rms, sure.get(what.effect, 0.0), wrong))
+        last = outcomes[-1]
+        progress(
+            f"{what.effect}, {what.times:g} times the rest: {'found' if last.found else 'not found'} "
+            f"({100 * last.presence:.0f} %){'; wrong: ' + ', '.join(wrong) if wrong else ''}"
+        )
+    return bare, outcomes
+
+
+def _motion(record: Record) -> Motion:
+    position, h = record.position, record.sample_time
+    if _CUTOFF * h < 0.4:
+        position = sosfiltfilt(butter(2, _CUTOFF, fs=1.0 / h, output="sos"), position)
+    velocity = np.gradient(position, record.time)
+    return Motion(position, velocity, np.sign(velocity), record.time, 1.0, 0.0, 1.0)
+
+
+def _later(record: Record) -> Array:
+    """What a delay by one sample changes of the effort [F]."""
+    change: Array = np.gradient(record.effort)
+    return change

@@ -1,0 +1,55 @@
+"""Effects concealed in a recording: the changed recording is that of an axis that has them, by simulation of that axis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import fric
+import numpy as np
+import pytest
+from fric.diagnosis.prove.injection import INJECTED, Injected, examined, injected, injections
+from fric.effects import EFFECTS
+from fric.model import build_model, term
+from fric.record import Record
+
+H = 1e-3
+NOMINAL = build_model("rigid", {"mass": 5.0}, [term("coulomb", force=8.0), term("viscous", coefficient=30.0)])
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    t = H * np.arange(9000)
+    force = 30.0 * np.sin(2.0 * np.pi * (0.3 + 0.06 * t) * t) + 12.0 * np.sin(2.0 * np.pi * 1.7 * t)
+    moved = fric.simulate(NOMINAL, force, period=H)
+    noise = np.random.default_rng(2).standard_normal((2, t.shape[0]))
+    return replace(moved, position=moved.position + 1e-7 * noise[0], effort=moved.effort + 0.05 * noise[1])
+
+
+def test_what_is_injected_is_in_the_vocabulary_and_of_the_size_that_is_said(record: Record) -> None:
+    names = {EFFECTS[key].id for key in EFFECTS}
+    for what in injections([3.0]):
+        assert what.effect in names
+        (changed,), rms = injected([record], what, 0.2)
+        added = changed.effort - record.effort
+        acts = np.abs(added) > 0.05 * np.max(np.abs(added))
+        assert rms == pytest.approx(0.6)
+        assert float(np.sqrt(np.mean(added[acts] ** 2))) == pytest.approx(0.6, rel=0.3 if what.effect == "delay" else 0.05)
+    assert len(injections([3.0, 6.0])) == 2 * (len(INJECTED) + 1)
+
+
+def test_the_axis_with_the_spring_moves_the_same_under_the_changed_effort(record: Record) -> None:
+    (changed,), _ = injected([record], Injected("stiffness", 3.0), 0.5)
+    added = changed.effort - record.effort
+    low = float(np.min(record.position))
+    slope = np.polyfit(record.position - low, added, 1)[0]
+    axis = NOMINAL.with_terms((*NOMINAL.terms, term("stiffness", stiffness=slope, position=low)))
+    moved = fric.simulate(axis, changed.effort, period=H)
+    plain = fric.simulate(NOMINAL, record.effort, period=H)
+    assert np.max(np.abs(moved.position - plain.position)) < 0.01 * np.ptp(plain.position)
+
+
+@pytest.mark.long
+def test_what_is_injected_is_found(record: Record) -> None:
+    bare, outcomes = examined([record], NOMINAL, [6.0], 6, lambda _: None, ["stiffness", "quadratic_drag"])
+    assert not bare.mismatch
+    assert all(each.found and not each.wrong for each in outcomes)

@@ -1,0 +1,78 @@
+"""Detection limits: at half of one an effect hardly shows, at one and a half of it it does, on recordings with that effect."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import fric
+import numpy as np
+import pytest
+from fric.diagnosis.additive.residual import independent_share
+from fric.diagnosis.candidates import candidates, scales_of
+from fric.diagnosis.fitting import State, refit
+from fric.diagnosis.limits import EVIDENCE, Limit, limits_of
+from fric.diagnosis.screen import screen
+from fric.diagnosis.start import started
+from fric.diagnosis.track import Track
+from fric.model import Term, build_model, term
+from fric.record import Record, Units
+
+H = 2e-3
+NOMINAL = build_model("rigid", {"mass": 5.0}, [term("coulomb", force=8.0), term("viscous", coefficient=30.0)])
+
+
+def recording(*added: Term) -> Record:
+    """The axis of NOMINAL with what is ``added``, under one force, with the noise of its instruments."""
+    t = H * np.arange(7000)
+    force = 30.0 * np.sin(2.0 * np.pi * (0.3 + 0.06 * t) * t) + 12.0 * np.sin(2.0 * np.pi * 1.7 * t)
+    moved = fric.simulate(NOMINAL.with_terms((*NOMINAL.terms, *added)), force, period=H)
+    random = np.random.default_rng(2)
+    n = t.shape[0]
+    return replace(
+        moved,
+        position=moved.position + 2e-6 * random.standard_normal(n),
+        effort=moved.effort + 0.3 * random.standard_normal(n),
+    )
+
+
+def followed(record: Record) -> tuple[Track, State]:
+    tracks, start = started(NOMINAL, [record])
+    track = tracks[len(tracks) // 2]
+    return track, refit(track, start)
+
+
+@pytest.fixture(scope="module")
+def limits() -> dict[str, Limit]:
+    track, state = followed(recording())
+    tried = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False).tried
+    return {each.effect: each for each in limits_of(track, state, tried, Units())}
+
+
+def evidence(added: Term) -> float:
+    """What the term gains where it is there, fitted in full [nats]."""
+    track, without = followed(recording(added))
+    whole = refit(track, without.fit.model.with_terms((*without.fit.model.terms, added)))
+    apart = round(1.0 / (track.bandwidth * H))
+    n = independent_share(whole.fit.residual[::apart]) * whole.fit.residual.shape[0] / apart
+    before, after = (float(each.fit.residual @ each.fit.residual) for each in (without, whole))
+    return 0.5 * n * math.log(before / after)
+
+
+@pytest.mark.parametrize("effect", ["bias", "stiffness", "quadratic_drag", "asymmetry", "delay"])
+def test_an_effect_shows_above_its_limit_and_not_below_it(limits: dict[str, Limit], effect: str) -> None:
+    limit = limits[effect]
+    assert limit.size is not None
+    assert not limit.softer
+    strong, weak = (
+        evidence(term(effect, **{**({"position": 0.0} if effect == "stiffness" else {}), limit.parameter: limit.size * by}))
+        for by in (1.5, 0.5)
+    )
+    assert strong > EVIDENCE
+    assert weak < EVIDENCE
+
+
+def test_what_is_not_recorded_has_no_limit_and_says_why(limits: dict[str, Limit]) -> None:
+    assert limits["temperature"].size is None
+    assert "hold nothing" in limits["temperature"].why
+    assert "coulomb" not in limits

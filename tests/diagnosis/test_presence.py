@@ -1,0 +1,54 @@
+"""What halves of a recording say of each term by itself: of one that is there, and of one that is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import fric
+import numpy as np
+import pytest
+from fric.diagnosis.fitting import refit
+from fric.diagnosis.presence import Presence, presences
+from fric.diagnosis.settle import Step
+from fric.diagnosis.start import started
+from fric.model import build_model, term
+
+H = 2e-3
+NOMINAL = build_model("rigid", {"mass": 5.0}, [term("coulomb", force=8.0), term("viscous", coefficient=30.0)])
+RIPPLE = {"cosine": 0.0, "sine": 2.0, "period": 0.02}
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[str, Presence]:
+    """An axis with a ripple, and beside it a force over time that belongs to no law; the model grown by ripple and drag."""
+    t = H * np.arange(7000)
+    force = 30.0 * np.sin(2.0 * np.pi * (0.3 + 0.06 * t) * t) + 12.0 * np.sin(2.0 * np.pi * 1.7 * t)
+    axis = NOMINAL.with_terms((*NOMINAL.terms, term("ripple", **RIPPLE)))
+    moved = fric.simulate(axis, force, period=H)
+    # The force that is recorded lacks what else acted: it wanders by half a newton.
+    wander = 0.5 * np.sin(2.0 * np.pi * 0.31 * t + 1.0) + 0.4 * np.sin(2.0 * np.pi * 0.83 * t)
+    noisy = 0.3 * np.random.default_rng(2).standard_normal(t.shape[0])
+    tracks, start = started(NOMINAL, [replace(moved, effort=moved.effort + wander + noisy)])
+    track = tracks[len(tracks) // 2]
+    terms = (*start.terms, term("ripple", **RIPPLE), term("quadratic_drag", coefficient=0.5))
+    state = refit(track, start.with_terms(terms))
+    begin = refit(track, start)
+    steps = [
+        Step(name, begin.left, state.left, state.floor, begin.excess, (), ())
+        for name in state.fit.model.prefixes
+        if name.split("#")[0] in ("ripple", "quadratic_drag")
+    ]
+    return presences(track, state.fit.model, steps)
+
+
+def test_what_is_there_is_found_in_either_half_with_the_same_values(found: dict[str, Presence]) -> None:
+    ripple = found["ripple"]
+    assert ripple.probability > 0.9
+    for half in ripple.halves:
+        assert half.nats > 6.0
+        assert half.parameters["ripple.period"] == pytest.approx(0.02, rel=3e-3)
+        assert np.hypot(half.parameters["ripple.cosine"], half.parameters["ripple.sine"]) == pytest.approx(2.0, rel=0.1)
+
+
+def test_what_only_mends_something_unknown_is_not_sure(found: dict[str, Presence]) -> None:
+    assert found["quadratic_drag"].probability < 0.5
