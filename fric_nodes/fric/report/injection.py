@@ -35,9 +35,9 @@ def injection_page(bare: Diagnosis, outcomes: Sequence[InjectionOutcome], comman
     hits = sum(each.found for each in outcomes)
     wrong = sum(bool(each.wrong) for each in outcomes)
     note = (
-        "Each effect was added to the recorded effort as the force that it would have needed along the measured motion; a delay "
-        "is the effort ahead of its time. The size is a multiple of the force that stays unexplained in the recordings as they "
-        "are."
+        "Each effect was added to the recorded effort as the force that it would have needed along the measured motion; a "
+        "delay is the effort ahead of its time. The size is a multiple of the force that stays unexplained in the recordings "
+        "as they are."
     )
     head = ("effect", "times the rest", "added force, rms", "presence", "", "named wrongly")
     return render(

@@ -50,6 +50,11 @@ def prove(
     if inject or model is not None:
         _inject(inject or [], model, sizes, only, out, as_json)
         return
+    _examine(cases, seed, variant, jobs, out, as_json)
+
+
+def _examine(cases: int, seed: int, variant: str, jobs: int | None, out: Path, as_json: bool) -> None:
+    """Simulated axes; the page and ``scores.json`` go into ``out``."""
     from fric.diagnosis.prove.examination import hold
     from fric.files import write_text
     from fric.report.prove import prove_page
