@@ -19,7 +19,7 @@ _COUNTED = ("reached", "left")  # ends of events that come again and again, and 
 
 
 class SafetyPanel:
-    """Offers ``~/enable``, ``~/disable`` and ``~/reset``.
+    """Offers ``~/enable``, ``~/disable`` and ``~/reset_fault``.
 
     Args:
         node: its counters become the layer's.
@@ -44,7 +44,7 @@ class SafetyPanel:
         self._total = sum(node.counters.values())
         self._lasting: dict[str, float] = {}  # what goes on, and when it was last counted [s]
         layer.counters = node.counters
-        requests = {"enable": enable or layer.enable, "disable": disable or layer.disable, "reset": layer.reset}
+        requests = {"enable": enable or layer.enable, "disable": disable or layer.disable, "reset_fault": layer.reset}
         add_triggers(node, {name: self._at_once(name, act) for name, act in requests.items()})
 
     def _at_once(self, name: str, act: Callable[[int], None]) -> Callable[[], str]:

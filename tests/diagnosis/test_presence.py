@@ -11,15 +11,19 @@ from fric.diagnosis.fitting import refit
 from fric.diagnosis.presence import Presence, presences
 from fric.diagnosis.settle import Step
 from fric.diagnosis.start import started
-from fric.model import build_model, term
+from fric.diagnosis.track import Track
+from fric.model import Model, build_model, term
 
 H = 2e-3
 NOMINAL = build_model("rigid", {"mass": 5.0}, [term("coulomb", force=8.0), term("viscous", coefficient=30.0)])
 RIPPLE = {"cosine": 0.0, "sine": 2.0, "period": 0.02}
 
 
+Fitted = tuple[Track, Model, list[Step]]
+
+
 @pytest.fixture(scope="module")
-def found() -> dict[str, Presence]:
+def fitted() -> Fitted:
     """An axis with a ripple, and beside it a force over time that belongs to no law; the model grown by ripple and drag."""
     t = H * np.arange(7000)
     force = 30.0 * np.sin(2.0 * np.pi * (0.3 + 0.06 * t) * t) + 12.0 * np.sin(2.0 * np.pi * 1.7 * t)
@@ -38,7 +42,12 @@ def found() -> dict[str, Presence]:
         for name in state.fit.model.prefixes
         if name.split("#")[0] in ("ripple", "quadratic_drag")
     ]
-    return presences(track, state.fit.model, steps)
+    return track, state.fit.model, steps
+
+
+@pytest.fixture(scope="module")
+def found(fitted: Fitted) -> dict[str, Presence]:
+    return presences(*fitted, 0.0)
 
 
 def test_what_is_there_is_found_in_either_half_with_the_same_values(found: dict[str, Presence]) -> None:
@@ -48,6 +57,11 @@ def test_what_is_there_is_found_in_either_half_with_the_same_values(found: dict[
         assert half.nats > 6.0
         assert half.parameters["ripple.period"] == pytest.approx(0.02, rel=3e-3)
         assert np.hypot(half.parameters["ripple.cosine"], half.parameters["ripple.sine"]) == pytest.approx(2.0, rel=0.1)
+
+
+def test_what_stays_unexplained_counts_against_everything(found: dict[str, Presence], fitted: Fitted) -> None:
+    sure = presences(*fitted, 0.4)
+    assert sure["ripple"].probability == pytest.approx(0.6 * found["ripple"].probability, abs=1e-3)
 
 
 def test_what_only_mends_something_unknown_is_not_sure(found: dict[str, Presence]) -> None:

@@ -57,7 +57,7 @@ class Partner:
         self.publisher = self.node.create_publisher(Float64, "force_command", DEEP)
         self.node.create_timer(0.005, self._command)
         self.clients = {
-            name: self.node.create_client(Trigger, f"hardware_bridge/{name}") for name in ("enable", "disable", "reset")
+            name: self.node.create_client(Trigger, f"hardware_bridge/{name}") for name in ("enable", "disable", "reset_fault")
         }
         graph.spin(self.bridge)
         graph.spin(self.node)
@@ -105,7 +105,7 @@ def test_commands_act_only_when_enabled_and_every_cause_is_named(
     assert partner.reports[-1].level in {DiagnosticStatus.ERROR, DiagnosticStatus.WARN, DiagnosticStatus.OK}
     partner.force = 5.0
     assert "command lost" in partner.ask("enable").message
-    graph.until(lambda: partner.ask("reset").success, "reset")
+    graph.until(lambda: partner.ask("reset_fault").success, "reset")
     partner.enable()
     graph.until(lambda: emulator.force == 5.0, "it moves again")
     # A second publisher.

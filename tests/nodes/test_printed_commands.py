@@ -291,7 +291,10 @@ KNOWN: dict[str, Case] = {
     "pip install 'fric[can]'": Case(checked=lambda: "\ncan = [" in (ROOT / "pyproject.toml").read_text(encoding="utf-8")),
     f"{_BRIDGE} -p driver:=serial -p serial.port:=/dev/ttyACM0": Case(node="hardware_bridge"),
     **{f"ros2 lifecycle set /pid {step}": _ASKED for step in ("configure", "activate")},
-    **{f"ros2 service call /{of} std_srvs/srv/Trigger": _ASKED for of in ("hardware_bridge/enable", "pid/reset", "pid/enable")},
+    **{
+        f"ros2 service call /{of} std_srvs/srv/Trigger": _ASKED
+        for of in ("hardware_bridge/enable", "pid/reset_fault", "pid/enable")
+    },
     "ros2 run fric_nodes pid --ros-args --params-file config/pid.yaml -p autostart:=false": Case(node="pid"),
     _TRIBOMETER: Case((_published("test_data_2.txt"),), data=True),
     "fric diagnose bags/tribometer --blocks 6 --start 8.5 --end 204 --model config/published/tribometer_nominal.yaml "

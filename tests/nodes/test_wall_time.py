@@ -222,8 +222,8 @@ def test_a_second_publisher_gets_no_force_and_is_named(graph: Graph) -> None:
     assert all(effort == 0.0 for _, _, effort in listener.states[-5:])
     # The fault stays until it is reset, and the axis until it is enabled; then one publisher alone moves it.
     graph.owns(other).destroy_publisher(second)
-    clients = {name: listener.node.create_client(Trigger, f"plant/{name}") for name in ("enable", "reset")}
+    clients = {name: listener.node.create_client(Trigger, f"plant/{name}") for name in ("enable", "reset_fault")}
     assert "second command source" in graph.ask(clients["enable"], Trigger.Request(), "the plant").message
-    assert graph.ask(clients["reset"], Trigger.Request(), "the plant").success
+    assert graph.ask(clients["reset_fault"], Trigger.Request(), "the plant").success
     graph.until(lambda: graph.ask(clients["enable"], Trigger.Request(), "the plant").success, "enabled with new readings")
     graph.until(lambda: listener.forces.publish(Float64(data=1.0)) or listener.states[-1][2] > 0.9, "it is moved again")

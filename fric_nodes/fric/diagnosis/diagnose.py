@@ -360,7 +360,10 @@ def _concluded(
         unexplained = replace(unexplained, where=where)
         if likely is not None and unknown:
             nobody = _unknown(where, likely, growth, scored, unexplained.share, stand_in)
-            findings = [nobody, *_beside(presences(track, end, growth.steps), findings, growth.steps)]
+            findings = [
+                nobody,
+                *_beside(presences(track, end, growth.steps, min(unexplained.share, 1.0)), findings, growth.steps),
+            ]
     everything = None if alone is None else unexplained.where
     if missing:
         unexplained = replace(unexplained, interval=_interval(unexplained.share, left, floor))

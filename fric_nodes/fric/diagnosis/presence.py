@@ -4,7 +4,7 @@ The grown model is fitted to one half of the recordings with a term and without 
 judged on the other half; and the other way round. What is there takes its part off either half. So the smaller of the two
 differences counts, as the logarithm of a likelihood ratio of so many values as what stays unexplained leaves independent:
 the more stays, and the longer it hangs together, the less sure is anything beside it. A rival fitted in full shares the
-probability by Bayes' rule.
+probability by Bayes' rule. And what nothing explains may show as any law: its share of what is missing counts against each.
 """
 
 from __future__ import annotations
@@ -58,8 +58,15 @@ class Presence:
     halves: tuple[Half, Half]
 
 
-def presences(track: Track, end: Model, steps: Sequence[Step]) -> dict[str, Presence]:
-    """How sure each term of the grown model ``end`` is there, by the name of the term."""
+def presences(track: Track, end: Model, steps: Sequence[Step], unexplained: float) -> dict[str, Presence]:
+    """How sure each term of the grown model ``end`` is there, by the name of the term.
+
+    Args:
+        track: the recordings learnt from.
+        end: the grown model, fitted.
+        steps: by which its terms came.
+        unexplained: share of what is missing that it leaves, 0 to 1.
+    """
     left = track.residual(end)
     n = left.shape[0]
     # What an observer sees is smooth over its time constant: the correlation is reckoned from rows that far apart.
@@ -77,7 +84,7 @@ def presences(track: Track, end: Model, steps: Sequence[Step]) -> dict[str, Pres
             halves.append(Half(nats, own))
         least = min(each.nats for each in halves)
         there = 1.0 / (1.0 + math.exp(-min(max((least - _EVEN) / _STEEP, -50.0), 50.0)))
-        sure = min(there * _among_rivals(step, independent), _MOST)
+        sure = min(there * _among_rivals(step, independent), _MOST) * (1.0 - unexplained)
         found[step.term] = Presence(round(sure, 4), (halves[0], halves[1]))
     return found
 

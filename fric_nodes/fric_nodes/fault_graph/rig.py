@@ -285,7 +285,7 @@ class GraphRig:
             for name in ("plant", "pid"):
                 state = self._counted.get((name, "safety state"), "")
                 if state == "fault":
-                    self._ask(Trigger, f"{name}/reset", Trigger.Request())
+                    self._ask(Trigger, f"{name}/reset_fault", Trigger.Request())
                 if state in {"fault", "disabled"}:
                     self._ask(Trigger, f"{name}/enable", Trigger.Request())
             if self.moves(1.5):

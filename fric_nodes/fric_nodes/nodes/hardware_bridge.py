@@ -2,7 +2,7 @@
 
 The parameter ``driver`` chooses the drive's protocol from :mod:`fric.drives`; its options are the parameters under its name.
 The bridge enables only on request (``~/enable``), or once by the parameter ``enable_at_start``; a fault stops the axis and
-stays until ``~/reset``. ``/diagnostics`` names every cause, and the log says when each begins.
+stays until ``~/reset_fault``. ``/diagnostics`` names every cause, and the log says when each begins.
 """
 
 from __future__ import annotations
