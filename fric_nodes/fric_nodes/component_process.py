@@ -19,6 +19,9 @@ from fric.threads import end_with_parent
 
 __all__ = ["ComponentProcess", "EndedError"]
 
+_THE_NODES = (signal.SIGINT, signal.SIGTERM)
+"""Signals that the node answers, and that reach all processes of a terminal."""
+
 
 class EndedError(RuntimeError):
     """The process was ended by something else, for instance for want of memory."""
@@ -26,7 +29,7 @@ class EndedError(RuntimeError):
 
 def _calm() -> None:
     """Leave the signals to the node, and the processor to the machine."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _THE_NODES:
         signal.signal(number, signal.SIG_IGN)
     os.nice(5)
     end_with_parent()
@@ -48,7 +51,12 @@ class ComponentProcess:
         self._pool: ProcessPoolExecutor | None = ProcessPoolExecutor(
             1, mp_context=multiprocessing.get_context("spawn"), initializer=_calm
         )
-        self._ready = self._pool.submit(_prepare, self._text)
+        # The process inherits that they are blocked: a Ctrl-C while it still imports would end it with a traceback.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _THE_NODES)
+        try:
+            self._ready = self._pool.submit(_prepare, self._text)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         self._pending: tuple[Future[Suspects], int] | None = None
 
     def prepared(self) -> bool:

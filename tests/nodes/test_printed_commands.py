@@ -202,6 +202,8 @@ _TIAGO = "fric import tiago_effort.csv --map config/published/torso.yaml --repai
 
 _STARTS = ("ros2 run fric_nodes", "fric node")
 _BRIDGE = "ros2 run fric_nodes hardware_bridge --ros-args --params-file config/hardware_bridge.yaml"
+_LONGEST, _JUDGED = _long(4 * 3600.0), _long(4 * 3600.0, status=(0, 1))
+_SERVICES = ("hardware_bridge/enable", "pid/reset_fault", "pid/enable")
 _ASKED = Case(checked=(ROOT / "tests" / "nodes" / "test_managed.py").is_file)  # of running nodes
 
 KNOWN: dict[str, Case] = {
@@ -275,26 +277,23 @@ KNOWN: dict[str, Case] = {
         f"fric model {what}": Case()
         for what in ("effects", "effects dwell_time", "effects presliding", "plants", "excitations", "methods", "schema")
     },
-    "fric verify --out verification.html": _long(7200.0),
-    **{f"fric verify compensation-{name}": _long(1200.0) for name in ("guideway", "robust")},
-    **{f"fric compete{quick} --out competition.html": _long(4 * 3600.0) for quick in ("", " --quick")},
-    **dict.fromkeys(("fric compete", "fric demo", "fric demo --clock wall"), _long(4 * 3600.0)),
-    "fric prove --cases 300 --seed 110 --out proof": _long(4 * 3600.0, status=(0, 1)),
+    **{f"fric verify {it}": _LONGEST for it in ("--out verification.html", "compensation-guideway", "compensation-robust")},
+    **{f"fric compete{how}": _LONGEST for how in ("", " --out competition.html", " --quick --out competition.html")},
+    **dict.fromkeys(("fric demo", "fric demo --clock wall"), _LONGEST),
     **{
-        f"fric bench {name}": _long(4 * 3600.0, status=(0, 1))
+        f"fric {name}": _JUDGED
         for name in (
-            *("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph", "tensor-product-control"),
-            *("compensation", "circle", "calibration"),
-            *(f"calibration-{name}" for name in ("oscillation", "forced", "static", "two-stage", "tensor-product")),
+            "prove --cases 300 --seed 110 --out proof",
+            "prove --inject bags/slide --model config/nominal_model.yaml --out proof",
+            *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),
+            *(f"bench {each}" for each in ("tensor-product-control", "compensation", "circle", "calibration")),
+            *(f"bench calibration-{each}" for each in ("oscillation", "forced", "static", "two-stage", "tensor-product")),
         )
     },
     "pip install 'fric[can]'": Case(checked=lambda: "\ncan = [" in (ROOT / "pyproject.toml").read_text(encoding="utf-8")),
     f"{_BRIDGE} -p driver:=serial -p serial.port:=/dev/ttyACM0": Case(node="hardware_bridge"),
     **{f"ros2 lifecycle set /pid {step}": _ASKED for step in ("configure", "activate")},
-    **{
-        f"ros2 service call /{of} std_srvs/srv/Trigger": _ASKED
-        for of in ("hardware_bridge/enable", "pid/reset_fault", "pid/enable")
-    },
+    **{f"ros2 service call /{of} std_srvs/srv/Trigger": _ASKED for of in _SERVICES},
     "ros2 run fric_nodes pid --ros-args --params-file config/pid.yaml -p autostart:=false": Case(node="pid"),
     _TRIBOMETER: Case((_published("test_data_2.txt"),), data=True),
     "fric diagnose bags/tribometer --blocks 6 --start 8.5 --end 204 --model config/published/tribometer_nominal.yaml "
