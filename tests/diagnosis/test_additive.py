@@ -85,6 +85,7 @@ def _grown(missing: dict[str, float]) -> dict[str, float]:
     return dict(zip(model.names, model.values.tolist(), strict=True))
 
 
+@pytest.mark.long
 def test_three_effects_at_once_are_found_with_their_values() -> None:
     found = _grown({"ripple": 0.5, "direction": 6.0, "drift": 0.02})
     assert {name.split(".")[0] for name in found} == {"mass", "coulomb", "viscous", "bias", "ripple", "asymmetry", "time_drift"}

@@ -78,6 +78,7 @@ def test_where_the_first_effects_leave_something_others_are_begun_with() -> None
     assert found.validation.noe_augmented < 0.1 * found.validation.noe_refit
 
 
+@pytest.mark.long
 def test_beside_an_actuator_far_beyond_its_limit_the_other_effect_is_found() -> None:
     # The command goes to five times the limit: what the drag takes is a thousandth of what the limit does.
     case = draw(521420051, "pair", ("quadratic_drag", "saturation"))
@@ -106,6 +107,7 @@ def test_a_shaft_that_hardens_is_no_gap_with_soft_stops() -> None:
         ("quadratic_drag", "power", 843366905, "quadratic_drag.exponent", 1.75),
     ],
 )
+@pytest.mark.long
 def test_what_a_usual_law_leaves_is_no_other_effect(effect: str, law: str, seed: int, name: str, true: float) -> None:
     case = draw(seed, "moderate", effect, "form")
     found = diagnose(case.train, case.validation, case.nominal)

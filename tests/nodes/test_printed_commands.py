@@ -222,7 +222,7 @@ KNOWN: dict[str, Case] = {
     ),
     _IMPORT: Case((_map,)),
     "fric identify bags/run --terms coulomb,viscous,bias,asymmetry --out found": Case((_after(_IMPORT),)),
-    "fric identify bags/slide --model config/start_model.yaml --out found": Case(),
+    "fric identify bags/slide --model config/start_model.yaml --out found": _long(1200.0),
     _DESIGN: _long(),
     "ros2 run fric_nodes excitation --ros-args --params-file found/excitation.yaml": Case((_found,), node="excitation"),
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml --out diagnosis": _long(),
