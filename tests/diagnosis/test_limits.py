@@ -8,7 +8,7 @@ from dataclasses import replace
 import fric
 import numpy as np
 import pytest
-from fric.diagnosis.additive.residual import independent_share
+from fric.diagnosis.additive.residual import independent_values
 from fric.diagnosis.candidates import candidates, scales_of
 from fric.diagnosis.fitting import State, refit
 from fric.diagnosis.limits import EVIDENCE, Limit, limits_of
@@ -53,8 +53,7 @@ def evidence(added: Term) -> float:
     """What the term gains where it is there, fitted in full [nats]."""
     track, without = followed(recording(added))
     whole = refit(track, without.fit.model.with_terms((*without.fit.model.terms, added)))
-    apart = round(1.0 / (track.bandwidth * H))
-    n = independent_share(whole.fit.residual[::apart]) * whole.fit.residual.shape[0] / apart
+    n = independent_values(track, whole.fit.residual)
     before, after = (float(each.fit.residual @ each.fit.residual) for each in (without, whole))
     return 0.5 * n * math.log(before / after)
 

@@ -18,7 +18,7 @@ from ..effect import Effect
 from ..effects import EFFECTS
 from ..model import ModelError, Term
 from ..record import Array, Units
-from .additive.residual import independent_share
+from .additive.residual import independent_values
 from .fitting import State
 from .screen import Column, Tried
 from .track import Track
@@ -78,8 +78,7 @@ def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units) 
     """
     residual = state.fit.residual
     n = residual.shape[0]
-    apart = max(round(1.0 / (track.bandwidth * min(run.sample_time for run in track.runs))), 1)
-    independent = independent_share(residual[::apart]) * n / apart
+    independent = independent_values(track, residual)
     energy = math.expm1(min(2.0 * EVIDENCE / max(independent, 1.0), 50.0)) * float(residual @ residual)
     basis, _ = np.linalg.qr(state.fit.jacobian / np.maximum(np.linalg.norm(state.fit.jacobian, axis=0), 1e-300))
     there = {held.effect.id for held in state.fit.model.terms}

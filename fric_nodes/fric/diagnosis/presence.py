@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Model
-from .additive.residual import independent_share
+from .additive.residual import independent_values
 from .candidates import scales_of
 from .fitting import bounds_of, free_names, without_term
 from .settle import Step
@@ -69,9 +69,7 @@ def presences(track: Track, end: Model, steps: Sequence[Step], unexplained: floa
     """
     left = track.residual(end)
     n = left.shape[0]
-    # What an observer sees is smooth over its time constant: the correlation is reckoned from rows that far apart.
-    apart = max(round(1.0 / (track.bandwidth * min(run.sample_time for run in track.runs))), 1)
-    independent = independent_share(left[::apart]) * n / apart
+    independent = independent_values(track, left)
     first = (np.arange(n) * 4 // n) % 2 == 0
     with_all = [_on_other(track, end, rows) for rows in (first, ~first)]
     found = {}

@@ -18,7 +18,7 @@ from ..track import Track, along
 from .components import BY_ID, COMB, COMPONENTS, OTHER_OF, OTHERS, Along, Component, Ranges, comb_cycles
 from .evidence import Grouped, Weighed
 
-__all__ = ["PRESENT", "Additive", "Presence", "additive", "independent_share"]
+__all__ = ["PRESENT", "Additive", "Presence", "additive", "independent_share", "independent_values"]
 
 PRESENT = 0.5
 """Probability from which on something is more likely missing in a component than not."""
@@ -213,6 +213,15 @@ def independent_share(residual: Array) -> float:
             break
         total += 2.0 * rho
     return 1.0 / total
+
+
+def independent_values(track: Track, residual: Array) -> float:
+    """About how many independent values a ``residual`` of the track holds, shape ``(n,)``.
+
+    What an observer sees is smooth over its time constant: the correlation is reckoned from rows that far apart.
+    """
+    apart = max(round(1.0 / (track.bandwidth * min(run.sample_time for run in track.runs))), 1)
+    return independent_share(residual[::apart]) * float(residual.shape[0]) / apart
 
 
 def _signals(track: Track, state: State) -> list[Along]:
