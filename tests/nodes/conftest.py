@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
-import random
 import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections import Counter
@@ -22,6 +19,7 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from fric_nodes.cli.env import variables
+from fric_nodes.domain import reserved_domain
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
@@ -34,7 +32,6 @@ NodeT = TypeVar("NodeT", bound=Node)
 LIMIT = 90.0  # [s] generous: a wait ends when its condition holds, and the machine may be busy
 _ROOT = Path(__file__).resolve().parents[2]
 _ASK_AGAIN = 5.0  # [s]
-_DOMAINS = range(1, 101)  # above that, the ports of DDS fall into those that the system gives away
 
 
 class Graph:
@@ -42,7 +39,8 @@ class Graph:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._lock, self.domain = _free_domain()
+        self._reserved = contextlib.ExitStack()
+        self.domain = self._reserved.enter_context(reserved_domain())
         self.environment = {
             **os.environ,
             "ROS_DOMAIN_ID": str(self.domain),
@@ -183,7 +181,7 @@ class Graph:
             node.destroy_node()
         for context in self._contexts:
             context.try_shutdown()
-        self._lock.close()
+        self._reserved.close()
 
 
 class ModelChange:
@@ -214,19 +212,6 @@ class ModelChange:
         assert self._graph.ask(self._client, request, "the plant").results[0].successful
         self._graph.until(lambda: self._since[-1] > before, "the time of the change")
         return self._since[-1]
-
-
-def _free_domain() -> tuple[Any, int]:
-    """A domain id that is locked for as long as the returned file is open, so that parallel test runs don't meet."""
-    for domain in random.sample(_DOMAINS, len(_DOMAINS)):
-        file = (Path(tempfile.gettempdir()) / f"fric-test-domain-{domain}.lock").open("w")
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            file.close()
-            continue
-        return file, domain
-    raise RuntimeError("no free ROS domain")
 
 
 @pytest.fixture

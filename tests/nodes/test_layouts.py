@@ -98,8 +98,9 @@ def running(graph: Graph) -> dict[str, tuple[str, Any]]:
         graph.spin(node, kind=EventsExecutor)
     reader = graph.node("reader")
     found: dict[str, tuple[str, Any]] = {}
-    named = {topic for topic in _named_topics() if topic not in _LATE}
-    graph.until(lambda: named <= {name for name, _ in reader.get_topic_names_and_types()}, f"the topics {named}")
+    known = _named_topics()
+    graph.until(lambda: known <= {name for name, _ in reader.get_topic_names_and_types()}, f"the topics {known}")
+    named = known - _LATE
     for topic, types in reader.get_topic_names_and_types():
         found[topic] = (types[0], None)
 

@@ -17,7 +17,7 @@ import numpy as np
 from fric.bench.benchmark import Benchmark
 from fric.figure import Figure
 
-from ..demo.graph import free_domain
+from ..domain import graph_domain
 
 if TYPE_CHECKING:
     from ..fault_graph.faults import Outcome
@@ -34,7 +34,7 @@ def inject(names: Sequence[str], times: int, told: Callable[[str], object]) -> d
     from ..fault_graph.rig import GraphRig
 
     found: dict[str, list[Outcome]] = {}
-    with tempfile.TemporaryDirectory() as folder, GraphRig(Path(folder), free_domain()) as rig:
+    with tempfile.TemporaryDirectory() as folder, graph_domain() as domain, GraphRig(Path(folder), domain) as rig:
         for name in names:
             random = np.random.default_rng(zlib.crc32(name.encode()))
             found[name] = [trial(rig, FAULTS[name], random) for _ in range(times)]

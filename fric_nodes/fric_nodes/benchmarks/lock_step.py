@@ -10,7 +10,8 @@ from fric.bench.benchmark import Benchmark
 from fric.figure import Figure
 from fric.shared_files import config_file
 
-from fric_nodes.demo.graph import Graph, NodeSetup, free_domain
+from fric_nodes.demo.graph import Graph, NodeSetup
+from fric_nodes.domain import graph_domain
 
 __all__ = ["BENCHMARK"]
 
@@ -26,7 +27,7 @@ def run() -> list[Figure]:
         NodeSetup("pid", loop, config_file("pid_lock_step.yaml")),
         NodeSetup("plant", loop | {"duration": _DURATION}, config_file("plant.yaml")),
     ]
-    with tempfile.TemporaryDirectory() as folder, Graph(nodes, Path(folder), free_domain()) as graph:
+    with tempfile.TemporaryDirectory() as folder, graph_domain() as domain, Graph(nodes, Path(folder), domain) as graph:
         graph.wait_for("plant", timeout=120.0)
         graph.stop()
         words = graph.text_of("plant")

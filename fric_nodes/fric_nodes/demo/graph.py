@@ -18,7 +18,7 @@ from types import TracebackType
 
 from fric.errors import InputError
 
-__all__ = ["Graph", "GraphError", "NodeSetup", "free_domain"]
+__all__ = ["Graph", "GraphError", "NodeSetup"]
 
 _STOP_TIME = 15.0  # [s] that a node has to end after SIGINT
 
@@ -61,12 +61,6 @@ def _as_yaml(value: object) -> str:
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_as_yaml(entry) for entry in value) + "]"
     return str(value)
-
-
-def free_domain() -> int:
-    """The ROS domain of the environment, or one that other graphs on this machine are unlikely to use."""
-    given = os.environ.get("ROS_DOMAIN_ID")
-    return int(given) if given else 1 + os.getpid() % 100
 
 
 class Graph:

@@ -21,7 +21,8 @@ from fric.identification.screen import screened
 from fric.model_file import read_model, write_model
 from fric.shared_files import config_file
 
-from .graph import Graph, NodeSetup, free_domain
+from ..domain import graph_domain
+from .graph import Graph, NodeSetup
 from .outcome import Run, read_run
 from .picture import write_picture
 from .report import DemoOutcome, demo_report
@@ -99,7 +100,7 @@ def _run(
     """One recorded run of the graph, and the lock-step rate that the plant reports."""
     bag = settings.out / "bags" / name
     *others, excitation = _nodes(settings, gains, motion, model, bag)
-    with Graph(others, settings.out / "logs" / name, free_domain()) as graph:
+    with graph_domain() as domain, Graph(others, settings.out / "logs" / name, domain) as graph:
         if settings.clock == "wall":
             # The motion must not begin before there is an axis to follow it.
             graph.wait_for_text("plant", "started", timeout=60.0)
