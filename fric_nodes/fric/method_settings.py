@@ -22,7 +22,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from .errors import InputError
 
-__all__ = ["FILTER", "PARAMETERS", "Options", "Setting", "declarations", "own_settings", "parsed", "set_values"]
+__all__ = ["FILTER", "PARAMETERS", "Options", "Setting", "declarations", "own_settings", "parsed", "set_values", "value_type"]
 
 
 @dataclass(frozen=True)
@@ -196,47 +196,61 @@ def _declarations(kind: Any) -> Mapping[str, tuple[Any, Setting]]:
     return found
 
 
-def own_settings(kind: type[Options]) -> tuple[str, ...]:
+def own_settings(kind: type[Options], common: type[Options] = Options) -> tuple[str, ...]:
     """Names of the settings that a method adds to the common ones."""
-    return tuple(each.name for each in fields(kind) if each.name not in declarations())
+    return tuple(each.name for each in fields(kind) if each.name not in declarations(common))
 
 
-def parsed(name: str, value: Any, kind: type[Options] = Options) -> Any:
+def parsed(name: str, value: Any, kind: type[Options] = Options, subject: str = "") -> Any:
     """A setting as it is held, from what a user gave: texts of repeated settings are read, limits are checked.
+
+    Args:
+        name: of the setting's field.
+        value: as it was given.
+        kind: type of the options.
+        subject: what an error names; empty: the option of the command line.
 
     Raises:
         InputError: the value can't be used.
     """
     hint, setting = declarations(kind)[name]
+    subject = subject or setting.option
     if get_origin(hint) is tuple:
-        return tuple(_entry(setting, each) for each in value or ())
+        return tuple(_entry(setting, each, subject) for each in value or ())
     if isinstance(value, str):
-        value = _from_text(hint, setting, value)
+        value = _from_text(hint, value, subject)
     if value is not None:
-        setting.check(setting.option, value)
+        setting.check(subject, value)
     return value
 
 
-def _entry(setting: Setting, value: Any) -> Any:
+def _entry(setting: Setting, value: Any, subject: str) -> Any:
     if setting.read is None or not isinstance(value, str):
         return value
     try:
         return setting.read(value)
     except ValueError:
-        raise InputError(setting.option, f"is '{value}'", f"give {setting.form}") from None
+        raise InputError(subject, f"is '{value}'", f"give {setting.form}") from None
 
 
-def _from_text(hint: Any, setting: Setting, text: str) -> Any:
-    """A single value from its text, by its declared type."""
+def value_type(hint: Any) -> tuple[type, bool]:
+    """Type of a setting's single value, or ``tuple`` for a repeated one, and whether it may be None."""
+    if get_origin(hint) is tuple:
+        return tuple, False
     kinds = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
-    kind = next(each for each in kinds if each is not type(None))
+    return next(each for each in kinds if each is not type(None)), type(None) in kinds
+
+
+def _from_text(hint: Any, text: str, subject: str) -> Any:
+    """A single value from its text, by its declared type."""
+    kind, _ = value_type(hint)
     try:
         if kind is bool:
             return {"true": True, "false": False}[text.lower()]
         return kind(text)
     except (ValueError, KeyError):
         words = {bool: "true or false", int: "a whole number", float: "a number"}
-        raise InputError(setting.option, f"is '{text}'", f"give {words.get(kind, 'a value')}") from None
+        raise InputError(subject, f"is '{text}'", f"give {words.get(kind, 'a value')}") from None
 
 
 def set_values(options: Options) -> dict[str, Any]:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import pytest
+from fric.errors import InputError
 from fric.excitation import EXCITATIONS
+from fric.method_settings import Options, Setting
 from fric_nodes.nodes.compensator import CompensatorNode
 from fric_nodes.nodes.excitation import ExcitationNode
 from fric_nodes.nodes.pid import PidNode
 from fric_nodes.nodes.plant import PlantNode
 from fric_nodes.parameters import NodeParameter, NodeParameterError, Settings
+from fric_nodes.setting_parameters import of_setting, setting_in
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -92,6 +96,49 @@ def test_every_excitation_is_set_by_parameters_of_its_own(graph: Graph) -> None:
     for kind in EXCITATIONS.values():
         for parameter in kind.parameters:
             assert node.get_parameter(f"{kind.id}.{parameter.name}").value == parameter.default
+
+
+@dataclass(frozen=True)
+class Declared(Options):
+    rule: Annotated[str, Setting("Which rule", choices=("plain", "fuzzy"))] = "plain"
+    offset: Annotated[float | None, Setting("An offset", "N", "none")] = None
+
+
+@pytest.mark.parametrize(
+    ("name", "default", "lower", "given", "held"),
+    [
+        ("cutoff", 0.0, 0.0, 0.0, None),
+        ("cutoff", 0.0, 0.0, 50.0, 50.0),
+        ("decimation", 0, 0, 3, 3),
+        ("rest_velocity", -1.0, -1.0, -1.0, None),
+        ("rest_velocity", -1.0, -1.0, 0.0, 0.0),
+        ("robust", False, -math.inf, True, True),
+        ("starts", 1, 1, 4, 4),
+        ("rule", "plain", -math.inf, "fuzzy", "fuzzy"),
+        ("offset", "", -math.inf, "-2.5", -2.5),
+        ("offset", "", -math.inf, "", None),
+        ("held", [""], -math.inf, ["mass"], ("mass",)),
+        ("bounds", [""], -math.inf, ["mass=1,2"], (("mass", 1.0, 2.0),)),
+    ],
+)
+def test_a_setting_of_a_method_is_a_parameter(
+    graph: Graph, name: str, default: object, lower: float, given: object, held: object
+) -> None:
+    parameter = of_setting(name, Declared, "own.")
+    assert (parameter.name, parameter.default, type(parameter.default)) == (f"own.{name}", default, type(default))
+    assert parameter.lower == lower
+    unset = graph.node("unset")
+    assert setting_in(Settings(unset, [parameter]), name, Declared, "own.") == getattr(Declared(), name)
+    node = graph.node("host", parameter_overrides=[Parameter(f"own.{name}", value=given)])
+    assert setting_in(Settings(node, [parameter]), name, Declared, "own.") == held
+
+
+@pytest.mark.parametrize(("name", "given"), [("rest_velocity", -0.5), ("bounds", ["mass=2,1"])])
+def test_a_setting_outside_what_it_declares_is_refused(graph: Graph, name: str, given: object) -> None:
+    node = graph.node("host", parameter_overrides=[Parameter(name, value=given)])
+    settings = Settings(node, [of_setting(name, Declared)])
+    with pytest.raises(InputError, match=f"parameter '{name}'"):
+        setting_in(settings, name, Declared)
 
 
 def test_a_process_with_a_bad_parameter_ends_with_one_line_and_status_2(graph: Graph) -> None:

@@ -99,6 +99,51 @@ def test_the_command_shows_it(environment: dict[str, str], command: str, shown: 
     assert shown in done.stdout, done.stderr
 
 
+NODE = """
+import rclpy
+from fric_nodes.nodes.identifier import IdentifierNode
+from rclpy.parameter import Parameter
+
+rclpy.init()
+given = {"estimator": "hasty", "hasty.hurry": 4.0, "forgetting_time": 20.0}
+node = IdentifierNode(parameter_overrides=[Parameter(name, value=value) for name, value in given.items()])
+described = node.describe_parameter("hasty.hurry")
+print(described.description, described.floating_point_range[0].from_value > 0.0)
+print(node._session.estimator.forgetting_time)
+node.destroy_node()
+rclpy.try_shutdown()
+"""
+
+
+def _node(environment: dict[str, str], *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *arguments], env=environment, capture_output=True, text=True, timeout=100, check=False
+    )
+
+
+def test_the_settings_of_an_estimator_are_parameters_of_the_node(environment: dict[str, str]) -> None:
+    done = _node(environment, "-c", NODE)
+    assert done.stdout.splitlines() == ["factor by which it forgets faster True", "5.0"], done.stderr
+    told = _node(environment, "-m", "fric_nodes.nodes.identifier", "--help").stdout
+    assert "hasty: hasty least squares" in told
+    assert "hasty.hurry (double) = 2.0" in told
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("hasty.hurry:=3.0",), "parameter 'hasty.hurry': is not used by the estimator rls; leave it out, or use hasty"),
+        (("estimator:=hasty", "cutoff:=50.0"), "parameter 'cutoff': is not used by the estimator hasty"),
+    ],
+)
+def test_a_setting_of_another_estimator_is_refused(environment: dict[str, str], given: tuple[str, ...], said: str) -> None:
+    parameters = [word for each in given for word in ("-p", each)]
+    done = _node(environment, "-m", "fric_nodes.nodes.identifier", "--ros-args", *parameters)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
 def test_a_plugin_that_can_not_be_imported_is_named(environment: dict[str, str], tmp_path: Path) -> None:
     broken = tmp_path / "broken_axis"
     broken.mkdir()

@@ -8,25 +8,24 @@ and the encoder flickers by a count. A short form of ``fric bench online``, whic
 from __future__ import annotations
 
 from ..figure import Figure
-from ..identification.online import ESTIMATORS
 from ..identification.online.trials import follow, wander
 from ..report.figures import Curve, stacked
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]
 
-_COLOURS = dict(zip(ESTIMATORS, ("before", "after", "second"), strict=True))
+_COLOURS = {"rls": "before", "ekf": "after", "ukf": "second"}
 _REST, _REST_STEP = 600.0, 0.01  # [s]
 
 
 def _run() -> Evidence:
     figures, panels = [], []
-    for kind in ESTIMATORS:
+    for kind, colour in _COLOURS.items():
         found = follow(kind)
         shown = found.time > 12.0
         curves = [
             Curve("true", found.time[shown], found.truth[shown], "true", "dash"),
-            Curve(kind, found.time[shown], found.value[shown], _COLOURS[kind]),
+            Curve(kind, found.time[shown], found.value[shown], colour),
         ]
         panels.append(("Coulomb friction [N]", curves))
         figures.append(Figure(f"{kind}: within 5 % of a friction grown by half, after", found.settled, "s", "<= 3"))

@@ -9,7 +9,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from fric.identification.online import ESTIMATORS
 from fric.identification.online.session import Session, well_determined
-from fric.identification.result import Options
 from fric.identification.start import start_model
 from fric.model_file import read_model
 from fric.record import Units
@@ -23,6 +22,7 @@ from ..parameters import NodeParameter
 from ..qos import MODEL
 from ..run import run
 from ..sample_node import SampleNode
+from ..setting_parameters import estimator_options, estimator_parameters
 
 __all__ = ["PARAMETERS", "IdentifierNode", "main"]
 
@@ -34,12 +34,10 @@ PARAMETERS = (
     NodeParameter(
         "estimator",
         "rls",
-        "rls: recursive least squares in blocks; ekf, ukf: Kalman filter on the friction state, sample by sample, with slip "
-        "dynamics and nonlinear parameters",
-        choices=ESTIMATORS,
+        "; ".join(f"{kind.id}: {kind.title}" for kind in ESTIMATORS.values()),
+        choices=tuple(ESTIMATORS),
     ),
-    NodeParameter("forgetting_time", 60.0, "how long informative motion counts", unit="s", lower=0.1, upper=1e9),
-    NodeParameter("cutoff", 0.0, "low-pass filter on the position; 0: chosen from the rate", unit="Hz", lower=0.0),
+    *estimator_parameters(ESTIMATORS),
     NodeParameter("publish_period", 0.5, "time of the samples between two estimates", unit="s", lower=0.01, upper=3600.0),
     NodeParameter("model_period", 2.0, "time of the samples between two models", unit="s", lower=0.01, upper=3600.0),
     NodeParameter("publish_model", True, "publish models once the estimate is well determined", settable=True),
@@ -53,7 +51,7 @@ class IdentifierNode(SampleNode):
     """Subscribes to joint states (and, where they carry no effort, to the force command) and estimates friction from them.
 
     Raises:
-        ModelError: the model file or the terms cannot be used.
+        InputError: the model file, the terms or a setting of the estimator cannot be used.
     """
 
     def __init__(self, **node_options: Any) -> None:
@@ -63,10 +61,9 @@ class IdentifierNode(SampleNode):
         units = Units(settings.text("position_unit"), settings.text("force_unit"))
         structure = read_model(file) if file else start_model(settings.texts("terms"), self.joint or "axis", units)
         hold = settings.text("effort_hold")
-        self._session = Session(
-            settings.text("estimator"), structure, settings.number("forgetting_time"),
-            Options(cutoff=settings.number("cutoff") or None), hold, settings.flag("autostart"),
-        )  # fmt: skip
+        estimator = settings.text("estimator")
+        options = estimator_options(settings, ESTIMATORS, estimator)
+        self._session = Session(estimator, structure, options, hold, settings.flag("autostart"))
         self.pairing = EffortPairing(hold, at_stamp=self._session.estimator.averages_force)
         self._published_at = self._model_at = -1
         self._unpublished = False

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from ...figure import Figure
 from ...identification.calibration import AXES, recording
 from ...identification.online import ESTIMATORS, make_estimator
-from ...identification.online.trials import FORGETTING_TIME, Moved, feed, follow, made, moved, wander
+from ...identification.online.trials import Moved, feed, follow, made, moved, wander
 from ..benchmark import Benchmark
 from ..trials import Finding, count, figures_of
 
@@ -51,7 +51,7 @@ class _Trial:
         start = axis.start
         for name, value in near.items():
             start = start.with_value(name, value)
-        estimator = make_estimator(self.kind, start, FORGETTING_TIME, hold="following")
+        estimator = make_estimator(self.kind, start, hold="following")
         feed(estimator, Moved(record.time, record.position, record.effort))
         found = estimator.estimate()
         rows = zip(found.names, found.values.tolist(), found.standard_errors.tolist(), strict=True)

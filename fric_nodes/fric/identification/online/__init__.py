@@ -3,27 +3,37 @@
 from __future__ import annotations
 
 from ...model import Model
-from ..result import Options
+from ...registry import discover
 from .estimate import Estimate, Estimator, State
 from .kalman import KalmanIdentifier
+from .kind import EstimatorKind, OnlineOptions
 from .recursive import OnlineIdentifier
 
-__all__ = ["ESTIMATORS", "Estimate", "Estimator", "KalmanIdentifier", "OnlineIdentifier", "State", "make_estimator"]
+__all__ = [
+    "ESTIMATORS",
+    "Estimate",
+    "Estimator",
+    "EstimatorKind",
+    "KalmanIdentifier",
+    "OnlineIdentifier",
+    "OnlineOptions",
+    "State",
+    "make_estimator",
+]
 
-ESTIMATORS = ("rls", "ekf", "ukf")
-"""Names of the estimators."""
+ESTIMATORS: dict[str, EstimatorKind] = {
+    kind.id: kind for kind in discover(f"{__name__}.estimators", "ESTIMATOR", EstimatorKind)
+}
+"""Every online estimator by its id."""
 
 
-def make_estimator(
-    kind: str, structure: Model, forgetting_time: float = 60.0, options: Options | None = None, hold: str = "preceding"
-) -> Estimator:
+def make_estimator(kind: str, structure: Model, options: OnlineOptions | None = None, hold: str = "preceding") -> Estimator:
     """The estimator of that name.
 
     Args:
         kind: one of :data:`ESTIMATORS`.
         structure: the terms to estimate; its values are the start.
-        forgetting_time: how long information counts, in time of informative motion [s].
-        options: which parameters are held or freed; for ``rls`` the filter settings too.
+        options: its settings, of the type that the estimator declares; None: the defaults.
         hold: how a sample's force relates to the intervals beside it, for those that take it as it was sent.
 
     Raises:
@@ -31,6 +41,5 @@ def make_estimator(
     """
     if kind not in ESTIMATORS:
         raise ValueError(f"estimator '{kind}', must be one of {', '.join(ESTIMATORS)}")
-    if kind == "rls":
-        return OnlineIdentifier(structure, forgetting_time, options)
-    return KalmanIdentifier(structure, forgetting_time, options, kind, hold)
+    found = ESTIMATORS[kind]
+    return found.begin(structure, found.settings() if options is None else options, hold)

@@ -11,10 +11,10 @@ from ...errors import InputError
 from ...model import Model
 from ...model_file import write_model
 from ...record import Units
-from ..result import Options
 from ..start import start_model
 from . import make_estimator
 from .estimate import Estimate, State
+from .kind import OnlineOptions
 
 __all__ = ["Session", "well_determined"]
 
@@ -27,8 +27,7 @@ class Session:
     Args:
         kind: of the estimator, one of :data:`ESTIMATORS`.
         structure: terms to estimate, with their start values.
-        forgetting_time: how long informative motion counts [s].
-        options: filter settings, and which parameters are held or freed.
+        options: settings of the estimator.
         hold: how an effort relates to the intervals beside its sample.
         running: learn from the first sample on; False waits for :meth:`start`.
 
@@ -37,17 +36,15 @@ class Session:
         estimator: in use.
     """
 
-    def __init__(self, kind: str, structure: Model, forgetting_time: float, options: Options, hold: str, running: bool) -> None:
+    def __init__(self, kind: str, structure: Model, options: OnlineOptions, hold: str, running: bool) -> None:
         self._kind = kind
-        self._forgetting_time = forgetting_time
-        self._options = options
         self._hold = hold
-        self.structure = structure
-        self._begin(running)
+        self._begin(structure, options, running)
 
-    def _begin(self, running: bool) -> None:
-        self.estimator = make_estimator(self._kind, self.structure, self._forgetting_time, self._options, self._hold)
+    def _begin(self, structure: Model, options: OnlineOptions, running: bool) -> None:
+        self.estimator = make_estimator(self._kind, structure, options, self._hold)
         self.estimator.state = State.RUNNING if running else State.IDLE
+        self.structure, self._options = structure, options
 
     def start(self, terms: Sequence[str], units: Units, forgetting_time: float) -> str:
         """Begin anew with ``terms`` (empty: the present ones) and ``forgetting_time`` [s] (0: the present one); says with what.
@@ -57,9 +54,9 @@ class Session:
         """
         if forgetting_time < 0 or not math.isfinite(forgetting_time):
             raise InputError("forgetting_time", f"is {forgetting_time}", "give a positive time, or 0 to keep it")
-        self.structure = start_model(list(terms), self.structure.joint, units) if terms else self.structure
-        self._forgetting_time = forgetting_time or self._forgetting_time
-        self._begin(True)
+        structure = start_model(list(terms), self.structure.joint, units) if terms else self.structure
+        options = replace(self._options, forgetting_time=forgetting_time or self._options.forgetting_time)
+        self._begin(structure, options, True)
         return f"estimating {', '.join(self.estimator.estimate().names)}"
 
     def freeze(self, frozen: bool) -> str:
@@ -75,7 +72,7 @@ class Session:
 
     def reset(self) -> str:
         """Forget everything and go on in the same state."""
-        self._begin(self.estimator.state is not State.IDLE)
+        self._begin(self.structure, self._options, self.estimator.state is not State.IDLE)
         return "reset"
 
     def model(self, joint: str) -> Model:

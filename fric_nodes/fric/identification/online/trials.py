@@ -16,9 +16,8 @@ from ..calibration import AXES, TestAxis
 from . import make_estimator
 from .estimate import Estimator
 
-__all__ = ["FORGETTING_TIME", "Followed", "Moved", "Wandered", "feed", "follow", "made", "moved", "wander"]
+__all__ = ["Followed", "Moved", "Wandered", "feed", "follow", "made", "moved", "wander"]
 
-FORGETTING_TIME = 60.0  # [s], as the node has it
 _STEP = 2e-3  # [s]
 _TONES = np.array([0.25, 0.45, 0.8, 1.3, 2.1, 3.1])  # [Hz]
 _TRAVEL = 0.1  # [m]
@@ -78,7 +77,7 @@ def feed(estimator: Estimator, run: Moved, looks: int = 0) -> tuple[Array, Array
 
 def made(kind: str, axis: TestAxis) -> Estimator:
     """The estimator ``kind`` for ``axis``, as the node makes it."""
-    return make_estimator(kind, axis.start, FORGETTING_TIME, hold="following")
+    return make_estimator(kind, axis.start, hold="following")
 
 
 @dataclass(frozen=True, eq=False)

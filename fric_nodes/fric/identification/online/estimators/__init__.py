@@ -1,0 +1,1 @@
+"""Online estimators: one per file, each with a constant ``ESTIMATOR``."""

@@ -1,0 +1,15 @@
+"""Extended Kalman filter on the friction state; see :mod:`..kalman`."""
+
+from __future__ import annotations
+
+from ..kalman import KalmanIdentifier
+from ..kind import EstimatorKind
+
+__all__ = ["ESTIMATOR"]
+
+ESTIMATOR = EstimatorKind(
+    id="ekf",
+    title="extended Kalman filter, sample by sample, with slip dynamics and nonlinear parameters",
+    begin=lambda structure, options, hold: KalmanIdentifier(structure, options.forgetting_time, options, "ekf", hold),
+    uses=("forgetting_time", "cutoff", "rest_velocity", "held", "freed"),
+)
