@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fric.bench import BENCHMARKS, Benchmark
+from fric.bench.benchmarks import instrument
 from fric.bench.by_scipy import fit_by_scipy
 from fric.figure import Figure
 from fric.record import Record
@@ -69,3 +70,12 @@ def test_the_fit_by_scipy_finds_the_values() -> None:
     mass, coulomb, _, asymmetry, viscous, bias = found.values
     assert (viscous + asymmetry) / mass == pytest.approx(1.0 / tau, rel=0.02)
     assert (6.0 - coulomb - bias) / mass == pytest.approx(v_end / tau, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("count", "trials", "interval"), [(9, 10, "0.596 to 0.982"), (0, 60, "0.000 to 0.060"), (60, 60, "0.940 to 1.000")]
+)
+def test_shares_come_with_wilsons_interval(count: int, trials: int, interval: str) -> None:
+    figure = instrument._share("found", count, trials, ">= 0.9")
+    assert figure.name == f"found: {count} of {trials} (95 %: {interval})"
+    assert figure.value == count / trials

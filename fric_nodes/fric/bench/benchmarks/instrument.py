@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
+from scipy.stats import binomtest
 
 from ...figure import Figure
 from ...instrument import inspect
@@ -41,17 +42,9 @@ def _long() -> Record:
     return Record(time_, np.round(position / 1e-6) * 1e-6, effort, reference=position, velocity=velocity)
 
 
-def wilson(count: int, trials: int, quantile: float = 1.96) -> tuple[float, float]:
-    """Interval of a share (Wilson 1927)."""
-    share, weight = count / trials, quantile**2 / trials
-    middle = (share + 0.5 * weight) / (1.0 + weight)
-    half = quantile / (1.0 + weight) * np.sqrt(share * (1.0 - share) / trials + 0.25 * weight / trials)
-    return max(float(middle - half), 0.0), min(float(middle + half), 1.0)
-
-
 def _share(name: str, count: int, trials: int, goal: str = "") -> Figure:
-    low, high = wilson(count, trials)
-    return Figure(f"{name}: {count} of {trials} (95 %: {low:.3f} to {high:.3f})", count / trials, "1", goal)
+    interval = binomtest(count, trials).proportion_ci(0.95, "wilson")
+    return Figure(f"{name}: {count} of {trials} (95 %: {interval.low:.3f} to {interval.high:.3f})", count / trials, "1", goal)
 
 
 def run() -> list[Figure]:
