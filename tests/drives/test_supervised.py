@@ -60,6 +60,17 @@ def test_it_waits_for_its_drive_and_starts_once(machine: Machine) -> None:
     assert machine.emulator.force == 0.0
 
 
+def test_whoever_disables_it_before_it_starts_has_it_stay_disabled(machine: Machine) -> None:
+    machine.run(0.1, 10.0)
+    machine.supervised.disable(machine.now)
+    machine.emulator.plug()
+    assert machine.run(0.5, 10.0) > 0
+    assert machine.layer.state is State.DISABLED
+    machine.supervised.enable(machine.now)
+    machine.run(0.5, 10.0)
+    assert machine.emulator.force == 10.0
+
+
 def test_unplugged_it_stops_and_is_back_within_a_second_but_gives_no_force(machine: Machine) -> None:
     machine.emulator.plug()
     machine.run(0.5, 15.0)

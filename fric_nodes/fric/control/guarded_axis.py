@@ -12,7 +12,8 @@ from collections.abc import Callable
 
 from ..axis import SimulatedAxis
 from ..axis_in_time import TimedDrive
-from .safety import SafetyError, SafetyLayer, State
+from .safety import SafetyLayer, State
+from .safety.starting import Starting
 
 __all__ = ["GuardedAxis"]
 
@@ -20,7 +21,7 @@ _NS = 1e9
 _SEED = 1_000_000  # numerical: [ns] between the readings of the resting axis before the start
 
 
-class GuardedAxis:
+class GuardedAxis(Starting):
     """Drive, safety layer and axis.
 
     Args:
@@ -30,19 +31,17 @@ class GuardedAxis:
         enabled: enable with the first command.
 
     Attributes:
-        layer: the safety layer.
         witness: called with time [ns], force [F], true position [x] and the layer's state whenever the drive has been told a
             force, for who judges what reaches the axis.
     """
 
     def __init__(self, axis: SimulatedAxis, layer: SafetyLayer, now: int, enabled: bool) -> None:
+        super().__init__(layer, enabled)
         limits = layer.limits
         # A force that has to come down by its rate takes its time; the watchdog, which cuts, leaves it that.
         down = limits.force / limits.force_rate if math.isfinite(limits.force_rate) else 0.0
         self._drive = TimedDrive(axis, now, round(_NS * (limits.command_timeout + down)))
         self._axis = axis
-        self.layer = layer
-        self._starts = enabled
         self.witness: Callable[[int, float, float, State], None] | None = None
         for before in (2, 1):
             layer.reading(now - before * _SEED, now - before * _SEED, axis.position)
@@ -57,8 +56,8 @@ class GuardedAxis:
         """A command for ``force`` [F], made at ``stamp`` [ns], has come; True when the watchdog ended the one before."""
         ended = self._advance(now)
         taken = self.layer.command(now, stamp, force)
-        if self._starts and taken:
-            self._start(now)
+        if taken:
+            self._start(now, keep=True)
         self._give(now, taken, between=True)
         return ended
 
@@ -67,36 +66,10 @@ class GuardedAxis:
         ended = self._advance(now)
         self.layer.reading(now, now, self._axis.position)
         self.layer.publishers(publishers)
-        if self._starts and self.layer.commanded:
-            self._start(now)
+        if self.layer.commanded:
+            self._start(now, keep=True)
         self._give(now, False, between=False)
         return ended
-
-    def enable(self, now: int) -> None:
-        """Let commands through.
-
-        Raises:
-            SafetyError: as of the layer.
-        """
-        self.layer.enable(now)
-        self._starts = False
-
-    def begin(self, enabled: bool) -> None:
-        """Go on after :meth:`disable`: enable with the next command, if that is wanted."""
-        self._starts = enabled
-
-    def disable(self, now: int) -> None:
-        """Stop the axis, and let no command through."""
-        self._starts = False
-        self.layer.disable(now)
-
-    def _start(self, now: int) -> None:
-        try:
-            self.layer.enable(now, keep=True)
-        except SafetyError:
-            self._starts = not self.layer.faults
-        else:
-            self._starts = False
 
     def _advance(self, now: int) -> bool:
         ended = self._drive.advance_to(now)

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 
-from .safety import SafetyError, SafetyLayer, State
+from .safety import SafetyLayer, State
 from .safety.senders import StreamWatch
+from .safety.starting import Starting
 from .stall import StallGuard
 
 __all__ = ["SafeControl"]
@@ -20,7 +21,7 @@ _NS = 1e9
 _UNTIMELY = {"too old", "from the future", "not finite"}  # refused references whose stamps tell nothing
 
 
-class SafeControl:
+class SafeControl(Starting):
     """Controller and safety layer of one axis.
 
     Args:
@@ -31,10 +32,9 @@ class SafeControl:
     """
 
     def __init__(self, guard: StallGuard, layer: SafetyLayer, wait: float, enabled: bool) -> None:
+        super().__init__(layer, enabled)
         self.guard = guard
-        self.layer = layer
         self._wait = round(_NS * wait)
-        self._starts = enabled
         self._stepped: int | None = None
         self._sent = 0.0
         self._senders = StreamWatch(round(_NS * guard.period))
@@ -52,23 +52,9 @@ class SafeControl:
             self.layer.fail("second reference source", f"{count} publishers, more references than one sends", now)
 
     def enable(self, now: int) -> None:
-        """Let forces through.
-
-        Raises:
-            SafetyError: as of the layer.
-        """
-        self.layer.enable(now)
+        """As of :class:`Starting`; the controller starts anew."""
+        super().enable(now)
         self.guard.restart()
-        self._starts = False
-
-    def begin(self, enabled: bool) -> None:
-        """Go on after :meth:`disable`: enable once with the next joint states, if that is wanted."""
-        self._starts = enabled
-
-    def disable(self, now: int) -> None:
-        """Stop the axis, and let no force through."""
-        self._starts = False
-        self.layer.disable(now)
 
     def answer(self, now: int, stamp: int, position: float, feedforward: float = 0.0, acting: float = 0.0) -> float | None:
         """The force [F] to be sent for a joint state; None: none. Arguments as of :meth:`StallGuard.answer`."""
@@ -97,19 +83,6 @@ class SafeControl:
         """Go on from zero where nobody has been sent a force for so long that it acts no more."""
         if self._stepped is not None and now - self._stepped > _NS * self.layer.limits.command_timeout:
             self.layer.cut(now)
-
-    def _start(self, now: int) -> None:
-        """Enable as soon as the layer has readings to rely on, once."""
-        if not self._starts:
-            return
-        if self.layer.faults:
-            self._starts = False
-            return
-        try:
-            self.layer.enable(now)
-        except SafetyError:
-            return
-        self._starts = False
 
     def _given(self, now: int, answered: bool) -> float | None:
         layer = self.layer

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..control.safety import SafetyError, SafetyLayer, State
+from ..control.safety import SafetyLayer, State
+from ..control.safety.starting import Starting
 from .drive import Drive, DriveError, JointReading
 
 __all__ = ["SupervisedDrive"]
@@ -12,7 +13,7 @@ __all__ = ["SupervisedDrive"]
 _RETRY = 200_000_000  # physical scale: [ns] between two tries to open; a device is back within a second then
 
 
-class SupervisedDrive:
+class SupervisedDrive(Starting):
     """What a bridge does in each period. No force reaches the drive but by the layer.
 
     A drive that is lost while it may move is a latched fault of the layer. It is opened again by itself, and gives no force
@@ -28,9 +29,8 @@ class SupervisedDrive:
     """
 
     def __init__(self, drive: Drive, layer: SafetyLayer, autostart: bool = False) -> None:
-        self.layer = layer
+        super().__init__(layer, autostart)
         self._drive = drive
-        self._starts = autostart
         self._is_open = False
         self._next_try: int | None = None
         self.trouble = "not opened yet"
@@ -52,13 +52,8 @@ class SupervisedDrive:
             return None
         if reading is not None:
             self.layer.reading(now, reading.stamp, reading.position, reading.temperature)
-            if self._starts:
-                self._start(now)
+            self._start(now)
         return reading
-
-    def begin(self, enabled: bool) -> None:
-        """Enable once as soon as there are readings to rely on, from now on; or not."""
-        self._starts = enabled
 
     def _opens(self, now: int) -> bool:
         if self._next_try is not None and 0 <= self._next_try - now <= _RETRY:
@@ -80,17 +75,6 @@ class SupervisedDrive:
         self._is_open = False
         self._next_try = now + _RETRY
         self._drive.close()
-
-    def _start(self, now: int) -> None:
-        """Enable as soon as the layer has readings to rely on, once."""
-        if self.layer.state is not State.DISABLED:
-            self._starts = False
-            return
-        try:
-            self.layer.enable(now)
-        except SafetyError:
-            return
-        self._starts = False
 
     def close(self) -> None:
         """Let go of the drive, which takes the force away."""

@@ -16,7 +16,7 @@ from ..identification.equations import surroundings
 from ..identification.screen import screened
 from ..model import Model
 from ..record import Array, Record
-from ..signals.initial_state import initial_state
+from ..signals.initial_state import InitialState, initial_state
 from ..simulation import simulate as _simulate
 from .reading import records_of
 from .structure import ModelLike, model_from
@@ -24,7 +24,7 @@ from .structure import ModelLike, model_from
 if TYPE_CHECKING:
     from .reading import Source
 
-__all__ = ["simulate"]
+__all__ = ["free_run", "simulate"]
 
 
 def simulate(
@@ -68,7 +68,7 @@ def simulate(
     if reference is not None and controller is not None:
         return closed_loop(held, read_controller(Path(controller)), _recorded(reference, held)).record
     if isinstance(force, (str, Path, Record)) or hasattr(force, "columns"):
-        return _free_run(held, _recorded(force, held))
+        return free_run(held, _recorded(force, held))[0]
     if period is None or not period > 0.0:
         raise InputError("simulate", "an array of forces has no period", "give period=..., the time from sample to sample [s]")
     effort: Array = np.array(force, dtype=np.float64)
@@ -93,7 +93,13 @@ def _recorded(source: Source, model: Model) -> Record:
     return replace(screened(record).uniform(), nominal=model.nominal)
 
 
-def _free_run(held: Model, record: Record) -> Record:
+def free_run(held: Model, record: Record) -> tuple[Record, InitialState]:
+    """The motion of a model under the force of ``record``, from its recorded state on, and that state.
+
+    Args:
+        held: the model.
+        record: evenly sampled; its position is the reference of what comes back.
+    """
     begin = initial_state(record.time, record.position)
     load, temperature = (each[:-1] if each.shape[0] > 1 else each for each in surroundings(record))
     motion = _simulate(
@@ -106,7 +112,7 @@ def _free_run(held: Model, record: Record) -> Record:
         load=load,
         temperature=temperature,
     )
-    return replace(
+    found = replace(
         record,
         position=motion.position,
         velocity=motion.velocity,
@@ -115,3 +121,4 @@ def _free_run(held: Model, record: Record) -> Record:
         source="simulation",
         notes=(f"simulated under the force of {record.source}",),
     )
+    return found, begin

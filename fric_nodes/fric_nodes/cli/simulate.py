@@ -82,32 +82,12 @@ def _recorded(path: Path, reading: Reading, model: Model) -> Record:
 
 def _free_run(held: Model, model: Path, force: Path, record: Record, out: Path) -> _Shown:
     import numpy as np
-    from fric import simulation
     from fric.bagio.write import write_record
-    from fric.identification.equations import surroundings
-    from fric.signals.initial_state import initial_state
+    from fric.facade.simulating import free_run
 
-    begin = initial_state(record.time, record.position)
-    load, temperature = (each[:-1] if each.shape[0] > 1 else each for each in surroundings(record))
-    motion = simulation.simulate(
-        held,
-        record.effort,
-        record.sample_time,
-        position=begin.position,
-        velocity=begin.velocity,
-        hold=record.hold,
-        load=load,
-        temperature=temperature,
-    )
-    error = float(np.sqrt(np.mean((motion.position - record.position) ** 2)))
-    simulated = replace(
-        record,
-        position=motion.position,
-        velocity=motion.velocity,
-        reference=record.position,
-        valid=None,
-        notes=(f"simulated from {model} under the force of {force}",),
-    )
+    simulated, begin = free_run(held, record)
+    error = float(np.sqrt(np.mean((simulated.position - record.position) ** 2)))
+    simulated = replace(simulated, notes=(f"simulated from {model} under the force of {force}",))
     write_record(simulated, out)
     unsure = float(begin.standard_errors[1])
     unit = record.units.position

@@ -69,7 +69,7 @@ class HardwareBridgeNode(ManagedNode):
         self._layer = SafetyLayer(limits_of(settings, self.period))
         drive = kind.make(checked_options(kind, given), self._now, link)
         self._drive = SupervisedDrive(drive, self._layer)
-        self._panel = SafetyPanel(self, self._layer, self._now)
+        self._panel = SafetyPanel(self, self._layer, self._now, self._drive.enable, self._drive.disable)
         self._epoch, self._origin = wall_clock()
         self._state = JointState(name=[self.joint], position=[0.0])
         self._state.header.frame_id = self.joint
@@ -86,8 +86,7 @@ class HardwareBridgeNode(ManagedNode):
 
     def deactivate(self) -> None:
         """Stop the axis; the drive stays open, its joint states are not published any more."""
-        self._drive.begin(False)
-        self._layer.disable(self._now())
+        self._drive.disable(self._now())
 
     def release(self) -> None:
         """Take the force away, and let go of the drive."""

@@ -13,22 +13,17 @@ Source: Feldman 1994 (FREEVIB); asymmetric friction named as continuing work by 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy import signal
 
-from ...method_settings import FILTER
-from ...model import Model
-from ...record import Array, Mask, Record
-from ..oscillation.conclusion import ALL, identified
+from ...record import Array, Mask
+from ..oscillation.conclusion import ALL, free_oscillation_method
 from ..oscillation.envelope import Envelope, cycle_mean, mirrored, phase_of
 from ..oscillation.recording import Oscillation
 from ..oscillation.result import FreeOscillation
 from ..oscillation.transformed import identify, inner_part
-from ..result import Identification, Method, Options
 
-__all__ = ["METHOD", "fit", "hilbert", "hilbert_envelope"]
+__all__ = ["METHOD", "hilbert", "hilbert_envelope"]
 
 _MARGIN = 0.75  # half cycles at either end
 
@@ -53,21 +48,4 @@ def hilbert(found: Oscillation, asked: Mask = ALL, rng: np.random.Generator | No
     return identify(found, hilbert_envelope, asked, np.random.default_rng(0) if rng is None else rng)
 
 
-def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
-    """Fit ``structure`` to free oscillations by the Hilbert transform; the mass is held.
-
-    Raises:
-        IdentificationError: a recording holds no free oscillation, or the structure is of another kind.
-    """
-    return identified(METHOD.id, hilbert, structure, records, options)
-
-
-METHOD = Method(
-    id="hilbert",
-    title="Hilbert transform",
-    needs="a free oscillation: released from a deflection, no force but a spring or a feedback of position and velocity",
-    source="Feldman 1994; de Marchi 1998",
-    fit=fit,
-    needs_force=False,
-    uses=(*FILTER, "held", "gains"),
-)
+METHOD = free_oscillation_method("hilbert", "Hilbert transform", "Feldman 1994; de Marchi 1998", hilbert)

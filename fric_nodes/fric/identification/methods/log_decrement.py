@@ -12,23 +12,18 @@ Source: de Marchi 1998 (extended logarithmic decrement); the derivation and corr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy import stats
 from scipy.optimize import least_squares
 
-from ...method_settings import FILTER
-from ...model import Model
-from ...record import Array, Mask, Record
-from ..oscillation.conclusion import ALL, identified
+from ...record import Array, Mask
+from ..oscillation.conclusion import ALL, free_oscillation_method
 from ..oscillation.motion import Natural, chain
 from ..oscillation.peaks import Peaks, find_peaks
 from ..oscillation.recording import Oscillation
 from ..oscillation.result import Curves, FreeOscillation, status_of
-from ..result import Identification, Method, Options
 
-__all__ = ["METHOD", "fit", "log_decrement", "textbook"]
+__all__ = ["METHOD", "log_decrement", "textbook"]
 
 
 def textbook(time: Array, position: Array, direction: int) -> Natural:
@@ -129,21 +124,4 @@ def log_decrement(found: Oscillation, asked: Mask = ALL) -> FreeOscillation:
     )
 
 
-def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
-    """Fit ``structure`` to free oscillations by the logarithmic decrement; the mass is held.
-
-    Raises:
-        IdentificationError: a recording holds no free oscillation, or the structure is of another kind.
-    """
-    return identified(METHOD.id, log_decrement, structure, records, options)
-
-
-METHOD = Method(
-    id="log-decrement",
-    title="extended logarithmic decrement",
-    needs="a free oscillation: released from a deflection, no force but a spring or a feedback of position and velocity",
-    source="de Marchi 1998",
-    fit=fit,
-    needs_force=False,
-    uses=(*FILTER, "held", "gains"),
-)
+METHOD = free_oscillation_method("log-decrement", "extended logarithmic decrement", "de Marchi 1998", log_decrement)

@@ -13,22 +13,17 @@ case derived here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from ...method_settings import FILTER
-from ...model import Model
-from ...record import Array, Mask, Record
-from ..oscillation.conclusion import ALL, identified
+from ...record import Array, Mask
+from ..oscillation.conclusion import ALL, free_oscillation_method
 from ..oscillation.envelope import Envelope, phase_of
 from ..oscillation.morlet import low_pass, morlet
 from ..oscillation.recording import Oscillation
 from ..oscillation.result import FreeOscillation
 from ..oscillation.transformed import identify, inner_part
-from ..result import Identification, Method, Options
 
-__all__ = ["METHOD", "fit", "wavelet_envelope", "wavelet_ridge"]
+__all__ = ["METHOD", "wavelet_envelope", "wavelet_ridge"]
 
 _CYCLES = 4.0  # n, the centre frequency of the wavelet in units of its bandwidth
 _MARGIN = 0.75
@@ -68,21 +63,6 @@ def wavelet_ridge(found: Oscillation, asked: Mask = ALL, rng: np.random.Generato
     return identify(found, wavelet_envelope, asked, np.random.default_rng(0) if rng is None else rng)
 
 
-def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
-    """Fit ``structure`` to free oscillations by the wavelet ridge; the mass is held.
-
-    Raises:
-        IdentificationError: a recording holds no free oscillation, or the structure is of another kind.
-    """
-    return identified(METHOD.id, wavelet_ridge, structure, records, options)
-
-
-METHOD = Method(
-    id="wavelet",
-    title="wavelet ridge",
-    needs="a free oscillation: released from a deflection, no force but a spring or a feedback of position and velocity",
-    source="Ruzzene, Fasana, Garibaldi, Piombo 1997; de Marchi 1998",
-    fit=fit,
-    needs_force=False,
-    uses=(*FILTER, "held", "gains"),
+METHOD = free_oscillation_method(
+    "wavelet", "wavelet ridge", "Ruzzene, Fasana, Garibaldi, Piombo 1997; de Marchi 1998", wavelet_ridge
 )

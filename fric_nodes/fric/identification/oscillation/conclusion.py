@@ -11,22 +11,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from ...method_settings import FILTER
 from ...model import Model
 from ...record import Array, Mask, Record
 from ...simulation import predict_force
 from ..conclusion import standard_errors
 from ..free_parameters import FreeParameters
-from ..result import Identification, IdentificationError, Options
+from ..result import Identification, IdentificationError, Method, Options
 from ..verdict import warnings_of
 from .motion import Natural
 from .recording import Oscillation, find_oscillation
 from .result import FreeOscillation
 from .scoring import score_of
 
-__all__ = ["ALL", "PHYSICAL", "asked_of", "closing", "constant_force", "gains_of", "identified", "oscillations", "physical"]
+__all__ = [
+    "ALL",
+    "PHYSICAL",
+    "asked_of",
+    "closing",
+    "constant_force",
+    "free_oscillation_method",
+    "gains_of",
+    "identified",
+    "oscillations",
+    "physical",
+]
 
 ALL: Mask = np.ones(5, dtype=np.bool_)
 
@@ -250,4 +263,22 @@ def closing(
         warnings=(*warnings, *more),
         notes=(*notes, *score_notes),
         train=train,
+    )
+
+
+def free_oscillation_method(
+    name: str, title: str, source: str, analyse: Callable[[Oscillation, Mask], FreeOscillation]
+) -> Method:
+    """The method that fits a structure to free oscillations by ``analyse``; the mass is held.
+
+    Its ``fit`` raises IdentificationError where a recording holds no free oscillation, or the structure is of another kind.
+    """
+    return Method(
+        id=name,
+        title=title,
+        needs="a free oscillation: released from a deflection, no force but a spring or a feedback of position and velocity",
+        source=source,
+        fit=partial(identified, name, analyse),
+        needs_force=False,
+        uses=(*FILTER, "held", "gains"),
     )
