@@ -12,7 +12,8 @@ and holds its members in modules or folders with the names of the catalogues her
 ``my_axis/effects/my_law.py`` with a constant ``EFFECT``, likewise ``plants`` (``PLANT``), ``excitation`` (``EXCITATION``),
 ``importers`` (``IMPORTER``), ``methods`` (``METHOD``), ``estimators`` (``ESTIMATOR``), ``checks`` (``CHECK``), ``feedbacks``
 (``CONTROLLER``), ``feedforwards`` (``FEEDFORWARD``), ``benchmarks`` (``BENCHMARK``) and ``report`` (``REPORT``). Each is
-imported when its catalogue is, so that an effect must not import what is built on effects.
+imported when its catalogue is, so that an effect must not import what is built on effects. A folder ``cli`` adds verbs to the
+command ``fric``, one per file: :mod:`fric_nodes.cli.main`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from importlib.metadata import entry_points
 from types import ModuleType
 from typing import TypeVar
 
-__all__ = ["GROUP", "discover"]
+__all__ = ["GROUP", "discover", "plugins"]
 
 GROUP = "fric.plugins"
 """Entry point group under which other packages add members to the catalogues."""
@@ -67,14 +68,14 @@ def _below(package: ModuleType) -> Iterator[ModuleType]:
 
 
 @cache
-def _plugins() -> tuple[tuple[str, str], ...]:
+def plugins() -> tuple[tuple[str, str], ...]:
     """Name and package of every plugin."""
     return tuple(sorted({(each.name, each.value) for each in entry_points(group=GROUP)}))
 
 
 def _in_plugins(catalogue: str) -> Iterator[ModuleType]:
     """The modules of every plugin that belong to a catalogue, by its folder's name."""
-    for name, package in _plugins():
+    for name, package in plugins():
         try:
             if importlib.util.find_spec(f"{package}.{catalogue}") is not None:
                 yield from _below(importlib.import_module(f"{package}.{catalogue}"))

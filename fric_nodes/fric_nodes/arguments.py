@@ -67,8 +67,8 @@ def help_text(name: str, about: str, declarations: Sequence[NodeParameter]) -> s
         declarations: its parameters.
     """
     head = [
-        f"usage: ros2 run fric_nodes {name} --ros-args -p NAME:=VALUE ... --params-file FILE",
-        f"   or: fric node {name} --ros-args ...",
+        f"usage: fric node {name} --ros-args -p NAME:=VALUE ... --params-file FILE",
+        f"   or: ros2 run fric_nodes {name} --ros-args ...",
         "",
         *textwrap.wrap(about, _WIDTH),
         "",

@@ -200,8 +200,7 @@ _SCREWS = (
 )
 _TIAGO = "fric import tiago_effort.csv --map config/published/torso.yaml --repair --out bags/torso"
 
-_STARTS = ("ros2 run fric_nodes", "fric node")
-_BRIDGE = "ros2 run fric_nodes hardware_bridge --ros-args --params-file config/hardware_bridge.yaml"
+_BRIDGE = "fric node hardware_bridge --ros-args --params-file config/hardware_bridge.yaml"
 _LONGEST, _JUDGED = _long(4 * 3600.0), _long(4 * 3600.0, status=(0, 1))
 _SERVICES = ("hardware_bridge/enable", "pid/reset_fault", "pid/enable")
 _ASKED = Case(checked=(ROOT / "tests" / "nodes" / "test_managed.py").is_file)  # of running nodes
@@ -224,7 +223,7 @@ KNOWN: dict[str, Case] = {
     "fric identify bags/run --terms coulomb,viscous,bias,asymmetry --out found": Case((_after(_IMPORT),)),
     "fric identify bags/slide --model config/start_model.yaml --out found": _long(1200.0),
     _DESIGN: _long(),
-    "ros2 run fric_nodes excitation --ros-args --params-file found/excitation.yaml": Case((_found,), node="excitation"),
+    "fric node excitation --ros-args --params-file found/excitation.yaml": Case((_found,), node="excitation"),
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml --out diagnosis": _long(),
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml": _long(),
     "fric diagnose bags/slide --blocks 8 --model config/nominal_model.yaml --out diagnosis": _long(),
@@ -235,15 +234,11 @@ KNOWN: dict[str, Case] = {
     "fric simulate found/model.yaml --closed-loop config/controller.yaml --reference bags/my_run --out bags/closed": Case(
         (_found, _followed)
     ),
-    **dict.fromkeys([f"{start} recorder --ros-args -p bag:=bags/my_run" for start in _STARTS], Case(node="recorder")),
-    "ros2 run fric_nodes player --ros-args -p bag:=bags/slide -p rate:=4.0": Case(node="player"),
-    **{
-        f"{start} compensator --ros-args --params-file config/compensator.yaml -p model_file:=found/model.yaml": Case(
-            (_found,), node="compensator"
-        )
-        for start in _STARTS
-    },
-    "ros2 run fric_nodes plant --help": Case(),
+    "fric node recorder --ros-args -p bag:=bags/my_run": Case(node="recorder"),
+    "fric node player --ros-args -p bag:=bags/slide -p rate:=4.0": Case(node="player"),
+    "fric node compensator --ros-args --params-file config/compensator.yaml -p model_file:=found/model.yaml": Case(
+        (_found,), node="compensator"
+    ),
     **dict.fromkeys(
         (
             "ros2 launch fric_nodes one_axis.launch.py model_file:=found/model.yaml bag:=bags/my_run",
@@ -252,13 +247,13 @@ KNOWN: dict[str, Case] = {
         ),
         Case(checked=(ROOT / "tests" / "packaging" / "test_launch.py").is_file),
     ),
-    'eval "$(fric env)" && ros2 run fric_nodes plant': Case(node="plant"),
-    'ros2 run fric_nodes excitation --ros-args --params-file config/excitation.yaml -p "wait_for_nodes:=[recorder]"': Case(
+    **dict.fromkeys(("ros2 run fric_nodes plant", 'eval "$(fric env)" && ros2 run fric_nodes plant'), Case(node="plant")),
+    'fric node excitation --ros-args --params-file config/excitation.yaml -p "wait_for_nodes:=[recorder]"': Case(
         node="excitation"
     ),
     **{
-        f"ros2 run fric_nodes {name} --ros-args --params-file config/{name}.yaml": Case((_found,), node=name)
-        for name in ("plant", "excitation", "pid", "identifier", "experiment", "monitor")
+        f"fric node {name} --ros-args --params-file config/{name}.yaml": Case((_found,), node=name)
+        for name in ("excitation", "pid", "identifier", "experiment", "monitor")
     },
     f"{_PLANT} -p model_file:=config/contact_model.yaml": Case(node="plant"),
     **{
@@ -294,7 +289,7 @@ KNOWN: dict[str, Case] = {
     f"{_BRIDGE} -p driver:=serial -p serial.port:=/dev/ttyACM0": Case(node="hardware_bridge"),
     **{f"ros2 lifecycle set /pid {step}": _ASKED for step in ("configure", "activate")},
     **{f"ros2 service call /{of} std_srvs/srv/Trigger": _ASKED for of in _SERVICES},
-    "ros2 run fric_nodes pid --ros-args --params-file config/pid.yaml -p autostart:=false": Case(node="pid"),
+    "fric node pid --ros-args --params-file config/pid.yaml -p autostart:=false": Case(node="pid"),
     _TRIBOMETER: Case((_published("test_data_2.txt"),), data=True),
     "fric diagnose bags/tribometer --blocks 6 --start 8.5 --end 204 --model config/published/tribometer_nominal.yaml "
     "--out diagnosis": _long(needs=(_after(_TRIBOMETER),), data=True),

@@ -66,7 +66,7 @@ def test_every_executable_starts(workspace: Path) -> None:
     lines = " & ".join(f"{run}{separator}{name} --help >{name}.txt" for name in NODES)
     shell(workspace, f". install/setup.sh; {lines} & wait")
     for name in NODES:
-        assert (workspace / f"{name}.txt").read_text(encoding="utf-8").startswith(f"usage: ros2 run fric_nodes {name} ")
+        assert (workspace / f"{name}.txt").read_text(encoding="utf-8").startswith(f"usage: fric node {name} ")
     plant = f"{run}{separator}plant --ros-args -p wait_for_subscribers:=0 -p duration:=0.3"
     assert "started" in shell(workspace, f". install/setup.sh && ROS_DOMAIN_ID=101 timeout 120 {plant}")
     assert "started" in shell(

@@ -89,6 +89,10 @@ def test_one_of_each_kind_from_outside(environment: dict[str, str], tmp_path: Pa
         ("model methods", "as-given"),
         ("model schema", "cubic_drag"),
         ("bench --help", "nothing"),
+        ("--help", "Say hello to an axis."),
+        ("greet --help", "Say hello to an axis."),
+        ("greet Anna", "hello, Anna"),
+        ("play --help", "Publish a recording"),
     ],
 )
 def test_the_command_shows_it(environment: dict[str, str], command: str, shown: str) -> None:
@@ -97,6 +101,14 @@ def test_the_command_shows_it(environment: dict[str, str], command: str, shown: 
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=100, check=False
     )
     assert shown in done.stdout, done.stderr
+
+
+def test_a_verb_that_can_not_be_imported_is_one_line(environment: dict[str, str]) -> None:
+    done = _python(environment, "-c", "from fric_nodes.cli.main import main; main()", "broken")
+    said = "fric: fric broken: other_axis.cli.broken can't be imported: No module named 'there_is_none'; mend the plugin"
+    assert done.returncode == 2
+    assert done.stderr.startswith(said), done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 NODE = """
@@ -115,16 +127,16 @@ rclpy.try_shutdown()
 """
 
 
-def _node(environment: dict[str, str], *arguments: str) -> subprocess.CompletedProcess[str]:
+def _python(environment: dict[str, str], *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, *arguments], env=environment, capture_output=True, text=True, timeout=100, check=False
     )
 
 
 def test_the_settings_of_an_estimator_are_parameters_of_the_node(environment: dict[str, str]) -> None:
-    done = _node(environment, "-c", NODE)
+    done = _python(environment, "-c", NODE)
     assert done.stdout.splitlines() == ["factor by which it forgets faster True", "5.0"], done.stderr
-    told = _node(environment, "-m", "fric_nodes.nodes.identifier", "--help").stdout
+    told = _python(environment, "-m", "fric_nodes.nodes.identifier", "--help").stdout
     assert "hasty: hasty least squares" in told
     assert "hasty.hurry (double) = 2.0" in told
 
@@ -138,7 +150,7 @@ def test_the_settings_of_an_estimator_are_parameters_of_the_node(environment: di
 )
 def test_a_setting_of_another_estimator_is_refused(environment: dict[str, str], given: tuple[str, ...], said: str) -> None:
     parameters = [word for each in given for word in ("-p", each)]
-    done = _node(environment, "-m", "fric_nodes.nodes.identifier", "--ros-args", *parameters)
+    done = _python(environment, "-m", "fric_nodes.nodes.identifier", "--ros-args", *parameters)
     assert done.returncode == 2
     assert said in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1

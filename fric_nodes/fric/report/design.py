@@ -124,7 +124,7 @@ def design_report(found: Proposal) -> str:
     )
     refused = ", ".join(f"{limit} {count}" for limit, count in sorted(trial.refused.items())) or "none"
     followed = f"Simulated under a PID controller with {gains_text(problem.gains)}; use gains that are about as stiff."
-    play = "ros2 run fric_nodes excitation --ros-args --params-file excitation.yaml"
+    play = "fric node excitation --ros-args --params-file excitation.yaml"
     sections = [
         Section("", (tiles(figures), paragraph(kept))),
         Section("The excitation", (_settings_table(found.parts), paragraph(followed, "note"), preformatted(play))),

@@ -79,5 +79,5 @@ def print_design(found: Proposal, out: Path, written: list[str]) -> None:
         shell.print(f"- {line}")
     for path in written:
         shell.print(f"written: {out / path}")
-    play = f"ros2 run fric_nodes excitation --ros-args --params-file {out / 'excitation.yaml'}"
+    play = f"fric node excitation --ros-args --params-file {out / 'excitation.yaml'}"
     shell.print(f"play it: {play}", soft_wrap=True)

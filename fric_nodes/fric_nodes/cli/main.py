@@ -1,14 +1,17 @@
 """The command ``fric``: lists its verbs, imports the one that is called, and prints a refusal as one line with status 2.
 
-A verb is a file of this folder whose docstring begins with ``fric VERB`` in quotes and what it does, and which has a function
-``register(app)``. The list of ``fric --help`` is made from these lines without importing the verbs, or what they are built on.
+A verb is a file of this folder, or of the folder ``cli`` of a plugin (:mod:`fric.registry`), whose docstring begins with
+``fric VERB`` in quotes and what it does, and which has a function ``register(app)``. The list of ``fric --help`` is made from
+these lines without importing the verbs, or what they are built on.
 """
 
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import re
 import sys
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -16,6 +19,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from fric import __version__
 from fric.errors import InputError
+from fric.registry import plugins
 from typer.core import TyperCommand, TyperGroup
 
 __all__ = ["build_app", "main", "verbs"]
@@ -32,17 +36,26 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 """A wrong option or argument; typer has no public name for it."""
 
 
+def _folders() -> Iterator[tuple[str, Path]]:
+    """Package and folder of verbs: those of plugins first, so that none of theirs takes the place of one of fric's own."""
+    for _, package in plugins():
+        found = importlib.util.find_spec(package)
+        for folder in (found.submodule_search_locations or ()) if found is not None else ():
+            yield f"{package}.cli", Path(folder) / "cli"
+    yield f"{__package__}", Path(__file__).parent
+
+
 @cache
 def verbs() -> dict[str, tuple[str, str]]:
     """Module and short help of every verb, by its name."""
     found = {}
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for package, path in ((package, path) for package, folder in _folders() for path in sorted(folder.glob("*.py"))):
         with path.open(encoding="utf-8") as file:
             head = _HEAD.match(file.readline())
         # import_.py holds the verb import, which is no name that Python takes.
         if head is not None and head["verb"] == path.stem.rstrip("_"):
             text = head["text"].replace("``", "")
-            found[head["verb"]] = (f"{__package__}.{path.stem}", f"{text[0].upper()}{text[1:]}.")
+            found[head["verb"]] = (f"{package}.{path.stem}", f"{text[0].upper()}{text[1:]}.")
     return dict(sorted(found.items()))
 
 
@@ -50,7 +63,13 @@ def verbs() -> dict[str, tuple[str, str]]:
 def _loaded(name: str) -> Any:
     """The command of a verb, which is imported for it."""
     app = typer.Typer(rich_markup_mode="rich")
-    importlib.import_module(verbs()[name][0]).register(app)
+    module = verbs()[name][0]
+    try:
+        importlib.import_module(module).register(app)
+    except ImportError as error:
+        if module.startswith(f"{__package__}."):
+            raise
+        raise InputError(f"fric {name}", f"{module} can't be imported: {error}", "mend the plugin, or uninstall it") from error
     return typer.main.get_group(app).commands[name]
 
 
