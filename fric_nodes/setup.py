@@ -26,7 +26,6 @@ setup(
     description=MANIFEST.findtext("description"),
     license=MANIFEST.findtext("license"),
     maintainer=MANIFEST.findtext("maintainer"),
-    maintainer_email=MANIFEST.find("maintainer").get("email"),
     packages=find_packages(include=["fric", "fric.*", NAME, f"{NAME}.*"]),
     package_data={
         "fric": ["py.typed", *(f"**/*.{kind}" for kind in ("html", "css", "js", "json", "svg", "yaml", "c", "h"))],

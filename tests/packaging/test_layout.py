@@ -90,6 +90,18 @@ def test_an_executable_runs_the_python_of_its_own_environment(tmp_path: Path) ->
     assert run() == f"other {script} --ros-args -r a b"
 
 
+def test_no_address_is_made_up() -> None:
+    """A package.xml must have one; what it has there can't be anybody's (RFC 2606). Nothing else names any."""
+    for package in ("fric_nodes", "fric_interfaces"):
+        maintainer = ElementTree.parse(ROOT / package / "package.xml").getroot().find("maintainer")
+        assert maintainer is not None
+        assert maintainer.get("email", "").endswith(".invalid")
+    for file in ("pyproject.toml", "fric_nodes/setup.py", "docs/SECURITY.md", "docs/CITATION.cff", "README.md"):
+        text = (ROOT / file).read_text(encoding="utf-8")
+        assert not re.findall(r"[\w.]+@[\w-]+\.\w+|email", text), file
+    assert importlib.metadata.metadata("fric").get("Author-email") is None
+
+
 def test_the_build_has_one_list_of_nodes() -> None:
     listed = (ROOT / "fric_nodes/resource/executables").read_text(encoding="utf-8").split()
     assert sorted(listed) == sorted(NODES)
