@@ -69,7 +69,7 @@ def test_the_deviation_of_a_law_without_memory_is_what_its_closed_form_says() ->
         s = np.sign(way)
         return float(s * g + (force - s * g) * np.exp(-abs(way) * unit))
 
-    (begin, back), _ = presliding_memory._LOOPS
+    (begin, back), _ = presliding_memory._LOOPS.inner
     tip = presliding_memory._TIP
     force = 0.0
     for way in (tip, -2 * tip, 2 * tip, -2 * tip, begin + tip):

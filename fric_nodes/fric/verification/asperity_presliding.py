@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
-
 import numpy as np
 
 from ..figure import Figure
 from ..friction.asperity import AsperityParameters, AsperityPopulation
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves
+from .nested_loops import NestedLoops
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]
@@ -18,52 +16,28 @@ __all__ = ["VERIFICATION"]
 _N = 10_000
 _TIP = 200  # amplitude of the outer loop, in steps; 0.1 w_0
 _STEP = 0.1 / _TIP
-_LOOPS = ((-40, -120), (80, 0))  # where each inner loop begins on the last rising branch, and how far back it goes
+_LOOPS = NestedLoops(_TIP, ((-40, -120), (80, 0)))
 _DURATION = 1000.0  # of the slowest run, with inner loops [tau]
 _RATES = (1, 5, 20)
 
 
-def _path(loops: Sequence[tuple[int, int]]) -> Array:
-    """In whole steps: up, down, up, down to the lower tip, then up again with the inner ``loops`` on the way."""
-    corners = [0, _TIP, -_TIP, _TIP, -_TIP]
-    for begin, back in loops:
-        corners += [begin, back, begin]
-    corners.append(_TIP)
-    parts = [np.arange(a, b, 1 if b > a else -1) for a, b in pairwise(corners)]
-    return np.concatenate([*parts, [_TIP]]).astype(np.float64)
-
-
-def _force(loops: Sequence[tuple[int, int]], rate: int) -> Array:
+def _force(inner: bool, rate: int) -> Array:
     """Force over each step of the path, after a rest of 100 tau."""
     population = AsperityPopulation(AsperityParameters(), _N)
     population.run(np.zeros(2), 100.0)
-    sample_time = _DURATION / (_path(_LOOPS).shape[0] - 1) / rate
-    return population.run(_STEP * _path(loops), sample_time).force
-
-
-def _deviations(plain: Array, looped: Array) -> list[float]:
-    """Largest deviation from the outer curve after each inner loop [F]."""
-    rising = plain[-2 * _TIP :]
-    found = []
-    n = looped.shape[0]
-    for number, (begin, _) in enumerate(_LOOPS):
-        end = _LOOPS[number + 1][0] if number + 1 < len(_LOOPS) else _TIP
-        later = sum(2 * (first - back) for first, back in _LOOPS[number + 1 :])
-        first = n - (_TIP - begin) - later
-        part = looped[first : first + end - begin]
-        found.append(float(np.max(np.abs(part - rising[begin + _TIP : end + _TIP]))))
-    return found
+    sample_time = _DURATION / (_LOOPS.path().shape[0] - 1) / rate
+    return population.run(_STEP * _LOOPS.path(inner), sample_time).force
 
 
 def _run() -> Evidence:
     figures, curves = [], []
     slowest: Array = np.zeros(0)
-    path = _path(_LOOPS)
+    path = _LOOPS.path()
     middle = 0.5 * (path[1:] + path[:-1]) * _STEP
     for rate, colour, dash in zip(_RATES, ("after", "before", "true"), ("solid", "dash", "dot"), strict=True):
-        plain, looped = _force((), rate), _force(_LOOPS, rate)
+        plain, looped = _force(False, rate), _force(True, rate)
         span = float(np.ptp(plain))
-        for number, off in enumerate(_deviations(plain, looped), start=1):
+        for number, off in enumerate(_LOOPS.deviations(plain, looped), start=1):
             name = f"at {rate}x: off the outer curve after inner loop {number}, of the force's range"
             figures.append(Figure(name, 100.0 * off / span, "%", "<= 1"))
         if rate == 1:

@@ -7,9 +7,6 @@ elasto-plastic) have forgotten where they turned and go on beside it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
-
 import numpy as np
 
 from ..figure import Figure
@@ -17,6 +14,7 @@ from ..model import Term, build_model, term
 from ..record import Array
 from ..report.figures import Curve, scatter_and_curves
 from ..simulation import Predictor
+from .nested_loops import NestedLoops
 from .verification import Evidence, Verification
 
 __all__ = ["VERIFICATION"]
@@ -26,7 +24,7 @@ _STIFFNESS = 1e5  # [N/m]
 _TIP = 800  # amplitude of the outer loop, in steps
 _STEP = 1e-7  # [m]
 _TIME = 1e-3  # [s] for each step
-_LOOPS = ((-150, -500), (350, 0))  # where each inner loop begins on the rising branch, and how far back it goes
+_LOOPS = NestedLoops(_TIP, ((-150, -500), (350, 0)))
 
 
 def _laws() -> dict[str, Term]:
@@ -42,16 +40,6 @@ def _laws() -> dict[str, Term]:
     }
 
 
-def _path(loops: Sequence[tuple[int, int]]) -> Array:
-    """Positions in whole steps: up, down, up, down to the lower tip, then up again with the inner ``loops`` on the way."""
-    corners = [0, _TIP, -_TIP, _TIP, -_TIP]
-    for begin, back in loops:
-        corners += [begin, back, begin]
-    corners.append(_TIP)
-    parts = [np.arange(a, b, 1 if b > a else -1) for a, b in pairwise(corners)]
-    return np.concatenate([*parts, [_TIP]]).astype(np.float64)
-
-
 def _force(law: Term, path: Array) -> tuple[Array, Array]:
     """Middle of each step along ``path`` [steps] and mean friction over it [N]."""
     model = build_model("rigid", {"mass": 1.0}, [term("coulomb", force=_LEVEL), law])
@@ -64,20 +52,10 @@ def _force(law: Term, path: Array) -> tuple[Array, Array]:
 
 def _deviations(law: Term) -> tuple[list[float], float, tuple[Array, Array], tuple[Array, Array]]:
     """Largest deviation after each inner loop, as a share of the force's range, that range, and both curves."""
-    plain = _force(law, _path(()))
-    looped = _force(law, _path(_LOOPS))
+    plain = _force(law, _LOOPS.path(inner=False))
+    looped = _force(law, _LOOPS.path())
     span = float(np.ptp(plain[1]))
-    rising = plain[1][-2 * _TIP :]  # the last branch, one step after the other from the lower tip
-    found = []
-    n = looped[0].shape[0]
-    for number, (begin, _) in enumerate(_LOOPS):
-        end = _LOOPS[number + 1][0] if number + 1 < len(_LOOPS) else _TIP
-        # From behind, the way from where the loop closes to where the next one begins.
-        later = sum(2 * (first - back) for first, back in _LOOPS[number + 1 :])
-        first = n - (_TIP - begin) - later
-        part = looped[1][first : first + end - begin]
-        found.append(float(np.max(np.abs(part - rising[begin + _TIP : end + _TIP]))) / span)
-    return found, span, plain, looped
+    return [each / span for each in _LOOPS.deviations(plain[1], looped[1])], span, plain, looped
 
 
 def _run() -> Evidence:
