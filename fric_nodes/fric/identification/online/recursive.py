@@ -19,6 +19,7 @@ white-noise formula widened by the residuals' first autocorrelation stands in.
 A step change of friction shows as residuals of which other values of the parameters would explain nine times as much as
 they usually would, in two blocks running. All but a moment's worth of the information from before the first of them then
 goes, values return to what they were, and that block is learnt again from the row on that the old values can't explain.
+(Packages for change points, such as ruptures, look for them in a whole series after its end.)
 """
 
 from __future__ import annotations
