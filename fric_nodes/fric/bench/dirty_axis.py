@@ -24,6 +24,7 @@ import numba
 import numpy as np
 
 from ..record import Array, Record
+from ..signals.pink_noise import pink_noise
 from ..signals.stamps import rounded_grid
 
 __all__ = ["Axis", "Dirt", "drawn", "recorded"]
@@ -201,15 +202,6 @@ def _reference(random: np.random.Generator, axis: Axis, h: float, duration: floa
     return np.asarray(first + (last - first) * s**2 * (3.0 - 2.0 * s))
 
 
-def _pink(random: np.random.Generator, n: int) -> Array:
-    """Noise whose power falls with frequency, of standard deviation one."""
-    spectrum = np.fft.rfft(random.standard_normal(n))
-    spectrum[1:] /= np.sqrt(np.arange(1, spectrum.shape[0]))
-    spectrum[0] = 0.0
-    values = np.fft.irfft(spectrum, n)
-    return np.asarray(values / np.std(values))
-
-
 def recorded(axis: Axis, dirt: Dirt, seed: int, duration: float = 15.0) -> Record:
     """What is recorded of ``axis`` through ``dirt`` over a motion that belongs to ``seed``."""
     random = np.random.default_rng(seed + 1_000_000)
@@ -242,7 +234,9 @@ def recorded(axis: Axis, dirt: Dirt, seed: int, duration: float = 15.0) -> Recor
     time = h * logged
     n_logged = logged.shape[0]
     level = axis.coulomb
-    force = force + level * dirt.force_noise * random.standard_normal(n_logged) + level * dirt.pink * _pink(random, n_logged)
+    force = (
+        force + level * dirt.force_noise * random.standard_normal(n_logged) + level * dirt.pink * pink_noise(random, n_logged)
+    )
     force += level * dirt.mains * np.sin(2.0 * math.pi * 50.0 * time + random.uniform(0.0, 2.0 * math.pi))
     if dirt.force_step:
         force = level * dirt.force_step * np.round(force / (level * dirt.force_step))

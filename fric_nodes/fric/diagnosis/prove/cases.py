@@ -6,7 +6,10 @@ has not seen (:mod:`.reckoning`):
 - *moderate*: an NOE between 1 and 15 %, and at least 15 times the noise floor;
 - *weak*: an NOE of 3 to 5 times the noise floor, which itself is 0.02 to 0.07 %;
 - a *pair*: two effects, each of which is moderate when it is concealed alone on this axis and these recordings;
-- *mixed*: as a pair, of an effect and of physics outside the vocabulary, as real machines have both.
+- *mixed*: as a pair, of an effect and of physics outside the vocabulary, as real machines have both;
+- *compound*: three to five effects, each of which leaves at least five times the noise floor when it is concealed alone.
+
+In the variant *dirt* the recordings are written as real machines write them (:mod:`.dirt`).
 
 In the variant *slow-log* a recording holds every second to eighth sample of the controller, and doesn't say that: what acted
 between two of them nobody knows. Weak effects, whose strength is one beside the noise alone, aren't asked for there.
@@ -19,7 +22,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +33,7 @@ from ...model_file import model_to_text
 from ...record import Array, Record
 from .axis import draw_setting
 from .concealed import CONCEALED, Changes, Concealed, clash
+from .dirt import drawn_dirt
 from .experiment import Bench, Recording, Unreachable, draw_recording, turned
 from .outside import OUTSIDE, Outside
 from .physics import Physics
@@ -38,12 +42,16 @@ from .structure import nominal_model, relative_errors, true_model
 
 __all__ = ["KINDS", "VARIANTS", "Case", "Order", "draw", "plan"]
 
-KINDS = ("moderate", "weak", "pair", "unknown", "nothing", "mixed")
-VARIANTS = ("standard", "form", "half-rate", "double-rate", "mixed", "slow-log", "foreign")
+KINDS = ("moderate", "weak", "pair", "unknown", "nothing", "mixed", "compound")
+VARIANTS = ("standard", "form", "half-rate", "double-rate", "mixed", "slow-log", "foreign", "dirt", "compound")
 
 _SHARES = {"moderate": 0.32, "weak": 0.16, "pair": 0.16, "unknown": 0.15, "nothing": 0.21}
 _MIXED_SHARES = {"mixed": 0.5, "unknown": 0.5}  # what is found beside something unknown: rightly, and wrongly
-_SLOW_LOG_SHARES = {"moderate": 0.42, "pair": 0.16, "unknown": 0.16, "nothing": 0.26}
+_COMPOUND_SHARES = {"compound": 0.85, "nothing": 0.15}
+_WITHOUT_WEAK = {"moderate": 0.42, "pair": 0.16, "unknown": 0.16, "nothing": 0.26}
+_SHARES_OF = {"mixed": _MIXED_SHARES, "slow-log": _WITHOUT_WEAK, "dirt": _WITHOUT_WEAK, "compound": _COMPOUND_SHARES}
+_SEVERAL = (3, 5)  # effects of a compound
+_OVER_FLOOR = 5.0  # times the noise floor, that each of a compound leaves alone at the least
 _EVERY = (2, 8)  # samples of the controller that a slow log holds one of
 _SLOWEST_LOG = 0.02  # [s]
 _RATE = {"half-rate": 0.5, "double-rate": 2.0}
@@ -89,7 +97,7 @@ def plan(n_cases: int, seed: int, variant: str = "standard") -> list[Order]:
     if n_cases < 1:
         raise InputError("--cases", f"{n_cases} is too few", "ask for at least one case")
     random = np.random.default_rng([seed, VARIANTS.index(variant)])
-    counts = _counts(n_cases, {"mixed": _MIXED_SHARES, "slow-log": _SLOW_LOG_SHARES}.get(variant, _SHARES))
+    counts = _counts(n_cases, _SHARES_OF.get(variant, _SHARES))
     chosen: list[tuple[str, tuple[str, ...]]] = []
     for kind, count in counts.items():
         chosen += [(kind, names) for names in _names(kind, count, variant, random)]
@@ -126,6 +134,8 @@ def _names(kind: str, count: int, variant: str, random: np.random.Generator) -> 
         effects = _single_effects("standard")
         pairs = [(a, b) for k, a in enumerate(effects) for b in effects[k + 1 :] if not clash(CONCEALED[a], CONCEALED[b])]
         return [pairs[int(at)] for at in random.permutation(len(pairs))[:count]]
+    if kind == "compound":
+        return [_several(random) for _ in range(count)]
     if kind == "mixed":
         known, others = _balanced(_single_effects("standard"), count, random), _balanced(list(OUTSIDE), count, random)
         # An axis can't need a part that it may not have.
@@ -134,6 +144,20 @@ def _names(kind: str, count: int, variant: str, random: np.random.Generator) -> 
             for a, b in zip(known, others, strict=True)
         ]
     return [(name,) for name in _balanced(_single_effects(variant), count, random)]
+
+
+def _several(random: np.random.Generator) -> tuple[str, ...]:
+    """Effects that can all be concealed together."""
+    wanted = int(random.integers(_SEVERAL[0], _SEVERAL[1] + 1))
+    effects = _single_effects("standard")
+    while True:
+        chosen: list[str] = []
+        for at in random.permutation(len(effects)):
+            name = effects[int(at)]
+            if not any(clash(CONCEALED[name], CONCEALED[other]) for other in chosen):
+                chosen.append(name)
+            if len(chosen) == wanted:
+                return tuple(chosen)
 
 
 def _balanced(names: Sequence[str], count: int, random: np.random.Generator) -> list[str]:
@@ -188,7 +212,7 @@ def make(order: Order) -> Case:
 
 def _catalogues(kind: str) -> tuple[Mapping[str, Concealed] | Mapping[str, Outside], ...]:
     """Where the names of a case of this kind are found, one for each."""
-    return {"unknown": (OUTSIDE,), "mixed": (CONCEALED, OUTSIDE)}.get(kind, (CONCEALED, CONCEALED))
+    return {"unknown": (OUTSIDE,), "mixed": (CONCEALED, OUTSIDE)}.get(kind, (CONCEALED,) * _SEVERAL[1])
 
 
 def _code(order: Order) -> tuple[int, int]:
@@ -259,7 +283,7 @@ def _solved(
     if kind == "weak":
         knob = turned(strength, 4.0, 1.2, largest)
     else:
-        low, high = (1.6, 7.0) if kind in ("pair", "mixed") else (1.4, 11.0)
+        low, high = {"pair": (1.6, 7.0), "mixed": (1.6, 7.0), "compound": (0.5, 7.0)}.get(kind, (1.4, 11.0))
         target = float(math.exp(random.uniform(math.log(low), math.log(high))))
         knob = turned(strength, target, 1.25, largest, enough=low)
     return knob, last[knob]
@@ -273,7 +297,7 @@ def _finished(
         raise Unreachable("friction that would be none in one direction")
     left = bench.remainder(physics, nominal)
     floor = bench.floor(physics)
-    _check(order.kind, left.noe, floor)
+    _check(order.kind, left.noe, floor, alone)
     conditions = {
         "normal_load": round(bench.setting.physics.mass * 9.81, 3),
         "temperature": _REFERENCE_TEMPERATURE,
@@ -308,6 +332,11 @@ def _finished(
     }
     train = [_record(bench, physics, each, signals, conditions, "train") for each in bench.train]
     validation = [_record(bench, physics, bench.validation, signals, conditions, "validation")]
+    if order.variant == "dirt":
+        dirt = drawn_dirt(bench.setting.friction, bench.setting.travel, bench.resolution, random)
+        key["dirt"] = asdict(dirt)
+        seeds = iter(random.integers(1, 2**31, len(train) + 1).tolist())
+        train, validation = ([dirt.on(each, next(seeds)) for each in held] for held in (train, validation))
     if order.variant == "slow-log":
         most = min(_EVERY[1], int(_SLOWEST_LOG / bench.setting.sample_time))
         every = int(random.integers(_EVERY[0], most + 1))
@@ -329,7 +358,7 @@ def _logged(record: Record, every: int) -> Record:
     )
 
 
-def _check(kind: str, noe: float, floor: float) -> None:
+def _check(kind: str, noe: float, floor: float, alone: Sequence[float]) -> None:
     """Raise where the finished case isn't what its kind promises."""
     if noe > _NO_AXIS:
         raise Unreachable("a drive that can't move the axis")
@@ -337,7 +366,9 @@ def _check(kind: str, noe: float, floor: float) -> None:
         raise Unreachable(f"the reckoning leaves {noe:.3g} % where nothing is concealed")
     if kind == "weak" and not 3.0 <= noe / floor <= 5.0:
         raise Unreachable(f"{noe / floor:.2g} times the floor")
-    if kind in ("moderate", "unknown", "pair", "mixed") and noe < 15.0 * floor:
+    if kind == "compound" and min(alone) < _OVER_FLOOR * floor:
+        raise Unreachable(f"an effect that leaves only {min(alone) / floor:.3g} times the floor")
+    if kind in ("moderate", "unknown", "pair", "mixed", "compound") and noe < 15.0 * floor:
         raise Unreachable(f"only {noe / floor:.3g} times the floor")
     if kind in ("moderate", "unknown") and not _MODERATE[0] <= noe <= _MODERATE[1]:
         raise Unreachable(f"an NOE of {noe:.3g} %")

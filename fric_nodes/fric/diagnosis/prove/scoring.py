@@ -121,7 +121,7 @@ class Outcome:
         named = {each.effect for each in self.findings}
         if self.kind == "nothing":
             return self.said == "nothing"
-        if self.kind in ("pair", "mixed"):
+        if self.kind in ("pair", "mixed", "compound"):
             return not self.failure and set(self.effects) <= named
         if self.kind == "unknown":
             return self.said == "unknown" and bool(self.findings) and self.findings[0].component in self.components
@@ -280,7 +280,7 @@ def scored(outcomes: Sequence[Outcome], variant: str = "standard") -> Score:
     slack = 0.0 if variant == "standard" else _SLACK
     by_kind = {
         kind: [each for each in outcomes if each.kind == kind]
-        for kind in ("moderate", "weak", "pair", "unknown", "nothing", "mixed")
+        for kind in ("moderate", "weak", "pair", "unknown", "nothing", "mixed", "compound")
     }
     rates: dict[str, Rate] = {}
     figures: list[Figure] = []
@@ -302,6 +302,7 @@ def scored(outcomes: Sequence[Outcome], variant: str = "standard") -> Score:
     rate("an effect beside physics outside the vocabulary: the effect named", mixed, lambda o: _names(o, o.effects[0]))
     rate("the same: said that something unknown is there", mixed, lambda o: _names(o, "unknown"))
     rate("the same: something else named that is more than half sure", mixed, _sure_and_wrong)
+    figures += _compound_figures(by_kind["compound"], rates)
     single = by_kind["moderate"] + by_kind["weak"]
     wrong = [each for each in single if not each.right]
     rate("wrong single effects whose runner-up is right", wrong, lambda o: o.runner_up_right)
@@ -320,7 +321,7 @@ def scored(outcomes: Sequence[Outcome], variant: str = "standard") -> Score:
     figures.append(Figure("time of a diagnosis, longest", max(o.seconds for o in outcomes), "s"))
     confusion: dict[tuple[str, str], int] = {}
     for each in outcomes:
-        if each.kind not in ("pair", "mixed"):
+        if each.kind not in ("pair", "mixed", "compound"):
             at = (each.effects[0] if each.effects else "nothing", each.said)
             confusion[at] = confusion.get(at, 0) + 1
     return Score(tuple(figures), rates, confusion, bins)
@@ -336,6 +337,30 @@ def _sure_and_wrong(outcome: Outcome) -> bool:
 
 def _component_right(outcome: Outcome) -> bool:
     return outcome.findings[0].component in outcome.components
+
+
+def _compound_figures(cases: Sequence[Outcome], rates: dict[str, Rate]) -> list[Figure]:
+    """Of what is concealed in several effects at once: how much is found at least half sure, how much of that is so."""
+    if not cases:
+        return []
+    surely = [[each.effect for each in case.findings if each.confidence >= 0.5 and each.effect != "unknown"] for case in cases]
+    pairs = list(zip(cases, surely, strict=True))
+    found = {
+        "several effects: each found with a presence of at least 0.5": (
+            Rate(sum(len(set(case.effects) & set(told)) for case, told in pairs), sum(len(case.effects) for case in cases)),
+            ">= 0.8",
+        ),
+        "the same: effects told with at least 0.5 that are there": (
+            Rate(sum(effect in case.effects for case, told in pairs for effect in told), sum(len(told) for told in surely)),
+            ">= 0.92",
+        ),
+        "the same: all effects of a case found": (
+            Rate(sum(set(case.effects) <= set(told) for case, told in pairs), len(cases)),
+            ">= 0.5",
+        ),
+    }
+    rates.update({name: rate for name, (rate, _) in found.items() if rate.of})
+    return [Figure(name, rate.value, "1", goal) for name, (rate, goal) in found.items() if rate.of]
 
 
 def _place_figures(by_kind: Mapping[str, Sequence[Outcome]], rates: dict[str, Rate]) -> list[Figure]:
