@@ -1,8 +1,8 @@
 """What stands between a real axis and its recording, put on an examiner's clean recordings.
 
 Coloured noise and mains in the force signal, the encoder's interpolation error, and stamps that jitter: where the clock
-alone is late, and where the position is read late. Sizes follow what the force signals of servo drives and the encoders of machine
-tools show: a few thousandths to a hundredth of the friction level, a few encoder steps, some tens of microseconds.
+alone is late, and where the position is read late. Sizes are those of servo drives and machine tools: a few thousandths to a
+hundredth of the friction level, an encoder step or two, some tens of microseconds.
 """
 
 from __future__ import annotations
