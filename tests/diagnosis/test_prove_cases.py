@@ -120,6 +120,32 @@ def test_an_effect_beside_physics_outside_the_vocabulary() -> None:
         draw(7, "mixed", ("payload_step", "stribeck"), "mixed")
 
 
+def test_several_effects_at_once_each_of_which_shows_alone() -> None:
+    orders = plan(60, 4, "compound")
+    assert {order.kind for order in orders} == {"compound", "nothing"}
+    several = [order.names for order in orders if order.kind == "compound"]
+    assert {len(names) for names in several} == {3, 4, 5}
+    assert not any(clash(CONCEALED[a], CONCEALED[b]) for names in several for a in names for b in names if a != b)
+    case = draw(3, "compound", ("ripple", "asymmetry", "stribeck"), "compound")
+    assert min(case.key["noe_alone"]) >= 5.0 * case.key["noise_floor"]
+    assert _noe(case, case.key["true_structure"]) < 0.1 * case.key["noe_refit"]
+
+
+def test_dirt_of_the_recordings_is_what_the_key_says() -> None:
+    clean, dirty = draw(9, "nothing"), draw(9, "nothing", variant="dirt")
+    assert clean.key.get("dirt") is None
+    dirt = dirty.key["dirt"]
+    record = dirty.train[0]
+    line = np.exp(-2j * np.pi * 50.0 * record.time)  # mains are what stands at 50 Hz above its neighbours
+    aside = np.exp(-2j * np.pi * 53.0 * record.time)
+    at_50, at_53 = (2.0 * abs(np.mean((record.effort - np.mean(record.effort)) * each)) for each in (line, aside))
+    assert at_50 == pytest.approx(dirt["mains"], abs=3.0 * at_53 + 0.05 * dirt["mains"])
+    step = np.diff(record.time)
+    assert np.all(step > 0.0)
+    stamps = np.std(step - np.median(step)) / np.sqrt(2.0)
+    assert stamps == pytest.approx(0.0 if dirt["read_late"] else dirt["jitter"], abs=1e-7, rel=0.1)
+
+
 def test_other_forms_and_rates() -> None:
     assert draw(4, "moderate", "presliding", "form").key["forms"][0] > 0
     half, double = draw(4, "moderate", "viscous", "half-rate"), draw(4, "moderate", "viscous", "double-rate")
@@ -151,4 +177,5 @@ def test_refusals() -> None:
         plan(10, 1, "odd")
     with pytest.raises(InputError, match="cases"):
         plan(0, 1)
-    assert set(VARIANTS) == {"standard", "form", "half-rate", "double-rate", "mixed", "slow-log", "foreign"}
+    known = {"standard", "form", "half-rate", "double-rate", "mixed", "slow-log", "foreign", "dirt", "compound"}
+    assert set(VARIANTS) == known

@@ -67,6 +67,18 @@ def test_what_counts_as_right() -> None:
     assert not _outcome("mixed", ("ripple", "unknown"), (_found("unknown"), _found("bias", 0.3))).right
 
 
+def test_of_several_effects_it_counts_what_is_found_at_least_half_sure_and_how_much_of_that_is_so() -> None:
+    first = _outcome(
+        "compound", ("ripple", "bias", "stribeck"), (_found("ripple"), _found("bias", 0.5), _found("backlash", 0.6))
+    )
+    second = _outcome("compound", ("ripple", "bias", "delay"), (_found("unknown"), _found("ripple", 0.49), _found("bias", 0.7)))
+    third = _outcome("compound", ("coulomb", "bias", "delay"), (_found("delay"), _found("coulomb"), _found("bias")))
+    rates = scored([first, second, third], "compound").rates
+    assert rates["several effects: each found with a presence of at least 0.5"] == Rate(6, 9)
+    assert rates["the same: effects told with at least 0.5 that are there"] == Rate(6, 7)
+    assert rates["the same: all effects of a case found"] == Rate(1, 3)
+
+
 def test_energy_within_spans_against_the_shortest_set() -> None:
     energy = np.zeros(1000)
     energy[200:250] = 1.0
