@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fric.diagnosis.additive.evidence import Grouped
-from fric.diagnosis.additive.growing import grown_by_parts, middle_of
+from fric.diagnosis.additive.together import grown_together, middle_of
 from fric.diagnosis.additive.told import by_component
 from fric.diagnosis.fitting import refit
 from fric.diagnosis.start import started
@@ -77,11 +77,9 @@ def _recording(missing: dict[str, float], seed: int = 5) -> Record:
 def _grown(missing: dict[str, float]) -> dict[str, float]:
     tracks, start = started(NOMINAL, [_recording(missing)])
     track = middle_of(tracks)
-    arrivals = grown_by_parts(track, refit(track, start), lambda _: None)
-    if not arrivals:
+    model = grown_together(track, refit(track, start), lambda _: None).fit.model
+    if len(model.terms) == len(NOMINAL.terms):
         return {}
-    model = arrivals[-1].after.fit.model
-    assert len(model.terms) == len(NOMINAL.terms) + len(arrivals)
     return dict(zip(model.names, model.values.tolist(), strict=True))
 
 

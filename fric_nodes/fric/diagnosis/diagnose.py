@@ -32,7 +32,7 @@ from .component import Signature, agreed, signatures
 from .confidence import LITTLE_LEFT, MANY, UNEXPLAINED, confidence_of, is_doubtful, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, refit
-from .grow import Growth, by_parts, grow, helped, with_moves, without_nothings
+from .grow import Growth, by_parts, grow, helped, together, with_moves, without_nothings
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
 from .limits import limits_of
@@ -153,9 +153,7 @@ def diagnose(
         tracks, start = started(nominal, train, as_given=True)
     parts = excerpt(tracks, start)
     searched = list(tracks if parts is None else parts.tracks)
-    growth = with_moves(grow(searched, start, tell), tell)
-    if growth.beyond > 0.0 or growth.rest > _most_left(growth):
-        growth = by_parts(searched, growth, tell)
+    growth = _grown_by_all(searched, start, tell)
     if growth.beyond > 0.0 or growth.rest > _most_left(growth):
         growth = helped(searched, growth, tell)
     if parts is not None:
@@ -174,6 +172,18 @@ def diagnose(
             "where the force is measured at the contact, make its plant 'contact'; else look at unit and sign (fric doctor)",
         )
     return found
+
+
+def _grown_by_all(tracks: Sequence[Track], start: Model, tell: Callable[[str], None]) -> Growth:
+    """``start`` grown: by all at once where that explains it, else one after the other, or by the better of both."""
+    proposed = together(tracks, start, tell)
+    complete = by_parts(tracks, proposed, tell)
+    if complete is not None:
+        return with_moves(complete, tell)
+    growth = with_moves(grow(tracks, start, tell), tell)
+    if growth.beyond > 0.0 or growth.rest > _most_left(growth):
+        return by_parts(tracks, proposed, tell, growth) or growth
+    return growth
 
 
 def refit_noe(model: Model, train: Sequence[Record], validation: Sequence[Record], bandwidth: float) -> float:

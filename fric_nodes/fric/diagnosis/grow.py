@@ -12,8 +12,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..model import Model, Term
-from .additive.growing import grown_by_parts, middle_of
+from ..model import Model
+from .additive.together import grown_together, middle_of, without_place
 from .candidates import candidates, scales_of
 from .fitting import NOTHING, State, best_track, refit, without_term
 from .laws import with_best_laws
@@ -23,7 +23,7 @@ from .screen import Screening, Tried, screen
 from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, audit, exchanged, is_nothing, merged, settled
 from .track import Track
 
-__all__ = ["Growth", "by_parts", "grow", "helped", "with_moves", "without_nothings"]
+__all__ = ["Growth", "by_parts", "grow", "helped", "together", "with_moves", "without_nothings"]
 
 _TO_COMPARE = 2  # terms, after which another beginning is tried
 _OTHER_BEGINNINGS = 2
@@ -41,6 +41,7 @@ _HARDLY = 0.5  # of what is missing: with more left, it is hardly explained
 _FASTER = 0.02  # of what is missing: with more left to a faster observer, it is looked at what that is
 _HELPS = 0.05  # of what is missing, a term has to take off to be told of beside something unknown
 _MOST_HELPING = 7  # terms then, with those that were there
+_TOGETHER = 3  # effects: of fewer the best is found one after the other
 _TRIED = 0.15  # of the floor: with more left above it, something is fitted in full, whatever it promises at first order
 
 
@@ -156,33 +157,59 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
     return more if more.steps and more.price < growth.price else growth
 
 
-def by_parts(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:
-    """``growth``, or the model grown from what each component lacks, where that leaves less.
+def together(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth:
+    """``nominal`` grown by all laws at once that its components ask for, not yet settled; without steps where none stays.
 
     Args:
-        tracks: those that ``growth`` was grown on.
-        growth: that leaves more than an explanation does.
+        tracks: the same recordings, followed at several bandwidths.
+        nominal: with values that a fit can start from.
         tell: told what comes.
     """
     tell("taking what is missing apart by the components of the machine")
     track = middle_of(tracks)
-    begin = refit(track, growth.begin.fit.model)
-    arrivals = grown_by_parts(track, begin, tell)
-    if not arrivals:
-        return growth
+    begin = refit(track, nominal)
+    end = grown_together(track, begin, tell)
+    model, own = end.fit.model, {held.effect.key for held in nominal.terms}
     steps = []
-    for each in arrivals:
-        name = each.after.fit.model.prefixes[_place_in(each.after, each.term)]
-        steps.append(Step(name, each.before.left, each.after.left, each.before.floor, each.before.excess, (), growth.last))
-    raw = Growth(track, begin, arrivals[-1].after, tuple(steps), growth.last, 1.0, growth.rejected, ended=True)
-    other = _settled(raw)
+    for k, held in enumerate(model.terms):
+        if held.effect.key not in own:
+            without = refit(track, without_place(model, k), max_iterations=8)
+            steps.append(Step(model.prefixes[k], without.left, end.left, without.floor, without.excess, (), ()))
+    return Growth(track, begin, end, tuple(steps), (), end.excess / max(begin.excess, 1e-300), ended=True)
+
+
+def by_parts(
+    tracks: Sequence[Track], proposed: Growth, tell: Callable[[str], None], growth: Growth | None = None
+) -> Growth | None:
+    """The model that was grown together, settled, where it leaves less than ``growth``; else that.
+
+    Without a ``growth`` to hold it against it is taken only where it is complete: several effects that leave hardly anything
+    on blocks that they have not seen, and to no observer.
+
+    Args:
+        tracks: those that both were grown on.
+        proposed: grown together.
+        tell: told what comes.
+        growth: grown otherwise.
+    """
+    left = proposed.end.excess
+    if not proposed.steps:
+        return growth
+    if growth is None and (
+        len(proposed.steps) < _TOGETHER or left > max(_LITTLE * proposed.begin.excess, CLEARLY * proposed.end.floor)
+    ):
+        return None
+    other = _settled(proposed)
+    if growth is None:
+        other = _grown_faster(tracks, other, tell)
+        complete = (
+            len(other.steps) >= _TOGETHER
+            and other.rest < _AGAIN
+            and implausible(other.track.masses, other.end.fit.model) == 0.0
+        )
+        return replace(other, last=_screened(other.track, other.end)) if complete else None
     better = bool(other.steps) and other.rest < max(growth.rest, growth.beyond) and other.price < growth.price + growth.beyond
-    return replace(other, last=_screened(track, other.end)) if better else growth
-
-
-def _place_in(state: State, held: Term) -> int:
-    """Number of the last term of the model that is of the effect of ``held``."""
-    return max(k for k, each in enumerate(state.fit.model.terms) if each.effect.id == held.effect.id)
+    return replace(other, last=_screened(other.track, other.end)) if better else growth
 
 
 def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:

@@ -9,8 +9,8 @@ from ...model import Model
 from ..fitting import refit
 from ..track import Track
 from .forms import Form, forms_of
-from .growing import middle_of
 from .residual import PRESENT, additive
+from .together import middle_of
 
 __all__ = ["ComponentFinding", "LawShare", "by_component"]
 
