@@ -208,8 +208,20 @@ def by_parts(
             and implausible(other.track.masses, other.end.fit.model) == 0.0
         )
         return replace(other, last=_screened(other.track, other.end)) if complete else None
-    better = bool(other.steps) and other.rest < max(growth.rest, growth.beyond) and other.price < growth.price + growth.beyond
+    better = bool(other.steps) and _to_a_fast_observer(tracks, other) < _to_a_fast_observer(tracks, growth)
     return replace(other, last=_screened(other.track, other.end)) if better else growth
+
+
+def _to_a_fast_observer(tracks: Sequence[Track], growth: Growth) -> float:
+    """Share of what is missing that the fastest observer to which it stands out sees unexplained, and the structure's price.
+
+    A slow one lets a model stick and slip in its own way: there a wrong structure may leave less than the true one.
+    """
+    for track in sorted(tracks, key=lambda each: -each.bandwidth):
+        begin, end = (refit(track, state.fit.model) for state in (growth.begin, growth.end))
+        if begin.excess > _FAINTLY * begin.floor:
+            return end.excess / begin.excess + growth.dear
+    return growth.price
 
 
 def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:
