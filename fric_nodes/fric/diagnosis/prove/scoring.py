@@ -26,6 +26,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 from ...effect import Place
 from ...effects import EFFECTS
@@ -36,7 +37,6 @@ __all__ = ["Found", "Outcome", "Rate", "Score", "calibration_bins", "components_
 
 _GRID = 0.05  # [s]
 _BINS = 10
-_Z = 1.959963984540054
 _SLACK = 0.05  # by which the goals of shares are wider in variants of the examination
 
 _COMPONENTS = {
@@ -150,10 +150,8 @@ class Rate:
         """Lower and upper end."""
         if not self.of:
             return math.nan, math.nan
-        n, p = self.of, self.hits / self.of
-        middle = (p + _Z * _Z / (2 * n)) / (1 + _Z * _Z / n)
-        half = _Z / (1 + _Z * _Z / n) * math.sqrt(p * (1 - p) / n + _Z * _Z / (4 * n * n))
-        return max(middle - half, 0.0), min(middle + half, 1.0)
+        interval = binomtest(self.hits, self.of).proportion_ci(0.95, "wilson")
+        return float(interval.low), float(interval.high)
 
 
 @dataclass(frozen=True)
