@@ -32,7 +32,7 @@ from .component import Signature, agreed, signatures
 from .confidence import LITTLE_LEFT, MANY, UNEXPLAINED, confidence_of, is_doubtful, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, refit
-from .grow import Growth, by_parts, grow, helped, together, with_moves, without_nothings
+from .grow import Growth, by_parts, first_terms, grow, helped, leaves_much, together, with_moves, without_nothings
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
 from .limits import limits_of
@@ -176,13 +176,14 @@ def diagnose(
 
 def _grown_by_all(tracks: Sequence[Track], start: Model, tell: Callable[[str], None]) -> Growth:
     """``start`` grown: by all at once where that explains it, else one after the other, or by the better of both."""
-    proposed = together(tracks, start, tell)
-    complete = by_parts(tracks, proposed, tell)
+    begun = first_terms(tracks, start, tell)
+    proposed = together(tracks, start, tell) if leaves_much(begun[1]) else None
+    complete = by_parts(tracks, proposed, tell) if proposed is not None else None
     if complete is not None:
         return with_moves(complete, tell)
-    growth = with_moves(grow(tracks, start, tell), tell)
+    growth = with_moves(grow(tracks, start, tell, begun), tell)
     if growth.beyond > 0.0 or growth.rest > _most_left(growth):
-        return by_parts(tracks, proposed, tell, growth) or growth
+        return by_parts(tracks, proposed or together(tracks, start, tell), tell, growth) or growth
     return growth
 
 

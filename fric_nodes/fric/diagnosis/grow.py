@@ -23,7 +23,7 @@ from .screen import Screening, Tried, screen
 from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, audit, exchanged, is_nothing, merged, settled
 from .track import Track
 
-__all__ = ["Growth", "by_parts", "grow", "helped", "together", "with_moves", "without_nothings"]
+__all__ = ["Growth", "by_parts", "first_terms", "grow", "helped", "leaves_much", "together", "with_moves", "without_nothings"]
 
 _TO_COMPARE = 2  # terms, after which another beginning is tried
 _OTHER_BEGINNINGS = 2
@@ -87,7 +87,24 @@ class Growth:
         return PER_PARAMETER * n + implausible(self.track.masses, self.end.fit.model)
 
 
-def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None] | None = None) -> Growth:
+def first_terms(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> tuple[Growth, Growth]:
+    """``nominal`` fitted, and with the two terms that explain most one after the other; fewer where nothing is left."""
+    track, state = best_track(tracks, nominal)
+    start = Growth(track, state, state, (), (), 1.0)
+    return start, _added(tracks, start, None, tell, most=_TO_COMPARE)
+
+
+def leaves_much(first: Growth) -> bool:
+    """True where the first terms of a model leave so much that there may be more effects, or others."""
+    return first.end.excess > CLEARLY * first.end.floor and _lacks(first) > _AGAIN
+
+
+def grow(
+    tracks: Sequence[Track],
+    nominal: Model,
+    progress: Callable[[str], None] | None = None,
+    begun: tuple[Growth, Growth] | None = None,
+) -> Growth:
     """Grow ``nominal`` until nothing is missing or nothing helps.
 
     What explains most of two effects alone may be neither of them, and what comes after it only mends it: where the first terms
@@ -98,9 +115,10 @@ def grow(tracks: Sequence[Track], nominal: Model, progress: Callable[[str], None
         tracks: the same recordings, followed at several bandwidths.
         nominal: with values that a fit can start from.
         progress: told what comes.
+        begun: what :func:`first_terms` has given, if that is known.
     """
     tell = progress or (lambda _: None)
-    best = _best_growth(tracks, nominal, tell)
+    best = _best_growth(tracks, nominal, tell, begun)
     slower = [track for track in tracks if track.bandwidth < best.track.bandwidth]
     if best.rest > _MUCH and slower and (best.steps or best.end.excess > NOTHING * best.end.floor):
         tell(f"much of it stays unexplained to an observer of {best.track.bandwidth:.3g} rad/s; looking with a slower one")
@@ -266,11 +284,12 @@ def without_nothings(growth: Growth, end: Model) -> tuple[Growth, Model]:
     return replace(growth, steps=kept, rejected=(*growth.rejected, *why)), left
 
 
-def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth:
+def _best_growth(
+    tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None], begun: tuple[Growth, Growth] | None = None
+) -> Growth:
     """The best of the models grown from two beginnings."""
-    track, state = best_track(tracks, nominal)
-    start = Growth(track, state, state, (), (), 1.0)
-    best = _grown(tracks, _compared(tracks, start, tell), tell)
+    start, first = begun or first_terms(tracks, nominal, tell)
+    best = _grown(tracks, _compared(tracks, start, first, tell), tell)
     if not best.steps or (best.rest > _HARDLY and best.begin.excess < _FAINTLY * best.begin.floor):
         faint = _faint(tracks, nominal, tell)
         if faint is not None and faint.steps and (not best.steps or faint.rest < best.rest):
@@ -278,13 +297,12 @@ def _best_growth(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], 
     return best
 
 
-def _compared(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None]) -> Growth:
-    """``start`` and its first terms: from what explains most alone, or from one of the next best, if that comes further.
+def _compared(tracks: Sequence[Track], start: Growth, first: Growth, tell: Callable[[str], None]) -> Growth:
+    """``start`` with the ``first`` terms, which begin with what explains most alone, or from the next best, if that is better.
 
     What does the work of two effects at once explains more than either, and stays in the way of both; and what explains it on
     an axis of another mass hasn't explained it.
     """
-    first = _added(tracks, start, None, tell, most=_TO_COMPARE)
     tried, begun = [(first, _surely_lacks(first))], {step.term.split("#")[0] for step in first.steps[:1]}
 
     def best_of_all() -> tuple[Growth, float]:
