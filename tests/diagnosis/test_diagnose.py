@@ -13,6 +13,7 @@ from fric.diagnosis.fitting import State, refit
 from fric.diagnosis.grow import Growth, without_nothings
 from fric.diagnosis.held_back import only_there
 from fric.diagnosis.prove import draw
+from fric.diagnosis.prove.cases import make, plan
 from fric.diagnosis.settle import Step
 from fric.diagnosis.track import Track
 from fric.model import build_model, term
@@ -359,3 +360,13 @@ def test_a_recording_of_rest_is_told_from_motion_beside_its_noise() -> None:
         found = diagnose([record, still], case.validation, case.nominal)
         assert not found.mismatch
         assert "still.mcap holds nothing but rest: left out" in found.notes
+
+
+@pytest.mark.long
+def test_three_effects_at_once_are_all_named_and_nothing_else() -> None:
+    order = plan(24, 99, "compound")[7]
+    assert order.names == ("quadratic_drag", "stiffness", "asymmetry")
+    case = make(order)
+    found = diagnose(case.train, case.validation, case.nominal)
+    assert {each.effect for each in found.findings if each.confidence >= 0.5} == set(order.names)
+    assert found.validation.noe_augmented < 1.1 * found.validation.noise_floor
