@@ -19,7 +19,7 @@ NOMINAL = build_model("rigid", {"mass": 5.0}, [term("coulomb", force=8.0), term(
 RIPPLE = {"cosine": 0.0, "sine": 2.0, "period": 0.02}
 
 
-Fitted = tuple[Track, Model, list[Step]]
+Fitted = tuple[Track, Model, Model, list[Step]]
 
 
 @pytest.fixture(scope="module")
@@ -42,17 +42,17 @@ def fitted() -> Fitted:
         for name in state.fit.model.prefixes
         if name.split("#")[0] in ("ripple", "quadratic_drag")
     ]
-    return track, state.fit.model, steps
+    return track, begin.fit.model, state.fit.model, steps
 
 
 @pytest.fixture(scope="module")
 def found(fitted: Fitted) -> dict[str, Presence]:
-    return presences(*fitted, 0.0)
+    return presences(*fitted, 0.0, fitted[0])
 
 
 def test_what_is_there_is_found_in_either_half_with_the_same_values(found: dict[str, Presence]) -> None:
     ripple = found["ripple"]
-    assert ripple.probability > 0.9
+    assert ripple.probability > 0.55
     for half in ripple.halves:
         assert half.nats > 6.0
         assert half.parameters["ripple.period"] == pytest.approx(0.02, rel=3e-3)
@@ -60,9 +60,9 @@ def test_what_is_there_is_found_in_either_half_with_the_same_values(found: dict[
 
 
 def test_what_stays_unexplained_counts_against_everything(found: dict[str, Presence], fitted: Fitted) -> None:
-    sure = presences(*fitted, 0.4)
+    sure = presences(*fitted, 0.4, fitted[0])
     assert sure["ripple"].probability == pytest.approx(0.6 * found["ripple"].probability, abs=1e-3)
 
 
 def test_what_only_mends_something_unknown_is_not_sure(found: dict[str, Presence]) -> None:
-    assert found["quadratic_drag"].probability < 0.5
+    assert found["quadratic_drag"].probability < 0.3

@@ -25,6 +25,7 @@ from ..record import Array, Record
 from ..signals.resolution import noise_of
 from ..signals.stamps import evened
 from ..threads import linear_algebra_in_one
+from .additive.together import middle_of
 from .additive.told import by_component
 from .blocks import one_sided
 from .candidates import FRICTION, Scales, candidates, place_of, scales_of
@@ -373,7 +374,11 @@ def _concluded(
             nobody = _unknown(where, likely, growth, scored, unexplained.share, stand_in)
             findings = [
                 nobody,
-                *_beside(presences(track, end, growth.steps, min(unexplained.share, 1.0)), findings, growth.steps),
+                *_beside(
+                    presences(track, begin, end, growth.steps, min(unexplained.share, 1.0), middle_of(searched)),
+                    findings,
+                    growth.steps,
+                ),
             ]
     everything = None if alone is None else unexplained.where
     if missing:

@@ -5,6 +5,9 @@ judged on the other half; and the other way round. What is there takes its part 
 differences counts, as the logarithm of a likelihood ratio of so many values as what stays unexplained leaves independent:
 the more stays, and the longer it hangs together, the less sure is anything beside it. A rival fitted in full shares the
 probability by Bayes' rule. And what nothing explains may show as any law: its share of what is missing counts against each.
+
+What belongs to no law may be mended by the same wrong law in either half. So a law has to be asked for, too, where flexible
+functions of all other components of the machine are there (:mod:`.additive`): what these explain as well is no evidence for it.
 """
 
 from __future__ import annotations
@@ -17,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Model
-from .additive.residual import independent_values
+from .additive.forms import Form, forms_of
+from .additive.residual import additive, independent_values
 from .candidates import scales_of
-from .fitting import bounds_of, free_names, without_term
+from .fitting import bounds_of, free_names, refit, without_term
 from .settle import Step
 from .track import Track
 
@@ -29,7 +33,7 @@ _A_LITTLE = 0.1  # of a residual of the half that is judged on: it says what the
 _ITERATIONS = 6
 _EVEN = 3.0  # statistical, nats: odds of twenty to one weigh up that one effect among twenty is there
 _STEEP = 1.5  # statistical, nats: by so much what is missing differs from the noise that the likelihood supposes
-_MOST = 0.98  # of all that was as sure, some came from physics that belongs to no law
+_MOST = 0.6  # statistical: of what came out surer beside physics outside the vocabulary, at least as much was wrong (seed 4711)
 
 
 @dataclass(frozen=True)
@@ -58,21 +62,26 @@ class Presence:
     halves: tuple[Half, Half]
 
 
-def presences(track: Track, end: Model, steps: Sequence[Step], unexplained: float) -> dict[str, Presence]:
+def presences(
+    track: Track, begin: Model, end: Model, steps: Sequence[Step], unexplained: float, middle: Track
+) -> dict[str, Presence]:
     """How sure each term of the grown model ``end`` is there, by the name of the term.
 
     Args:
         track: the recordings learnt from.
+        begin: the refitted nominal model.
         end: the grown model, fitted.
         steps: by which its terms came.
         unexplained: share of what is missing that it leaves, 0 to 1.
+        middle: the recordings as an observer sees them that takes them apart by components.
     """
     left = track.residual(end)
     n = left.shape[0]
     independent = independent_values(track, left)
     first = (np.arange(n) * 4 // n) % 2 == 0
     with_all = [_on_other(track, end, rows) for rows in (first, ~first)]
-    found = {}
+    found: dict[str, Presence] = {}
+    at_first = _forms(middle, begin) if steps else []
     for step in steps:
         without = without_term(end, step.term.split("#")[0])
         halves = []
@@ -81,10 +90,33 @@ def presences(track: Track, end: Model, steps: Sequence[Step], unexplained: floa
             own = {p.name: p.value for p in fitted.parameters() if p.name.startswith(f"{step.term}.")}
             halves.append(Half(nats, own))
         least = min(each.nats for each in halves)
-        there = 1.0 / (1.0 + math.exp(-min(max((least - _EVEN) / _STEEP, -50.0), 50.0)))
-        sure = min(there * _among_rivals(step, independent), _MOST) * (1.0 - unexplained)
+        sure = min(
+            _probability(least) * _among_rivals(step, independent),
+            _asked_for(step, at_first),
+            _asked_for(step, _forms(middle, without)),
+            _MOST,
+        )
+        sure *= 1.0 - unexplained
         found[step.term] = Presence(round(sure, 4), (halves[0], halves[1]))
     return found
+
+
+def _probability(nats: float) -> float:
+    """That an effect is there, from the logarithm of its likelihood ratio."""
+    return 1.0 / (1.0 + math.exp(-min(max((nats - _EVEN) / _STEEP, -50.0), 50.0)))
+
+
+def _forms(track: Track, model: Model) -> list[Form]:
+    """The laws that explain what ``model`` lacks beside flexible functions of all other components."""
+    state = refit(track, model)
+    return forms_of(state, additive(track, state))
+
+
+def _asked_for(step: Step, forms: Sequence[Form]) -> float:
+    """Probability of the effect of ``step`` among ``forms``."""
+    effect = step.term.split("#")[0]
+    mine = (each for each in forms if each.term.effect.id == effect)
+    return max((_probability(each.nats) * each.probability for each in mine), default=0.0)
 
 
 def _on_other(track: Track, model: Model, rows: NDArray[np.bool_]) -> tuple[Model, float]:
