@@ -16,7 +16,13 @@ PYPROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 ROSDEP = {"pyserial": "python3-serial", "rosbags": "python3-rosbags-pip"}
 """rosdep keys that are not ``python3-NAME``."""
 
-IMPORTED_AS = {"serial": "pyserial", "ruamel": "ruamel.yaml", "backports": "backports.zstd", "yaml": "ruamel.yaml"}
+IMPORTED_AS = {
+    "serial": "pyserial",
+    "ruamel": "ruamel.yaml",
+    "backports": "backports.zstd",
+    "yaml": "ruamel.yaml",
+    "dask": "distributed",
+}
 
 
 def listed(head: str) -> list[str]:
@@ -66,7 +72,7 @@ def test_every_import_is_a_dependency() -> None:
             elif isinstance(each, ast.Import):
                 imported |= {alias.name.split(".")[0] for alias in each.names}
     imported -= {*sys.stdlib_module_names, "fric", "fric_nodes", "fric_interfaces"}
-    extras = {name(each) for head in ("can = [", "control = [") for each in listed(head)}
+    extras = {name(each) for head in ("batch = [", "can = [", "control = [") for each in listed(head)}
     known = {*RUN, *extras, *(each.removeprefix("ros-").replace("-", "_") for each in RUN)}
     missing = {each for each in imported if IMPORTED_AS.get(each, each.lower()) not in known}
     # Parts of what is listed: message generators and the index come with rclpy, apsw with rosbags, can with python-can; and of

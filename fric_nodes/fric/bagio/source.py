@@ -106,6 +106,13 @@ class Source:
         """True when the bag is read record by record."""
         return self._reader is None
 
+    @property
+    def start_ns(self) -> int | None:
+        """Time of reception of the first message [ns]; None when there is none."""
+        if self._reader is not None:
+            return int(self._reader.start_time) if self._reader.message_count else None
+        return next((message.log_time_ns for message in self.messages()), None)
+
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]:
         """Messages in the order of reception; of all topics when ``topics`` is None.
 

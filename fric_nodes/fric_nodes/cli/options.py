@@ -65,6 +65,16 @@ class Reading:
         """Names of the topics.
 
         Raises:
+            InputError: as :meth:`roles`.
+        """
+        from fric.bagio.topics import Topics
+
+        return Topics(**self.roles())
+
+    def roles(self) -> dict[str, str]:
+        """Names of the topics that were given, by role.
+
+        Raises:
             InputError: not ROLE=NAME, or no such role.
         """
         from fric.bagio.topics import Topics
@@ -76,7 +86,7 @@ class Reading:
                 roles = ", ".join(Topics.__dataclass_fields__)
                 raise InputError("--topic", f"'{entry}' is not ROLE=NAME", f"use a role of {roles}")
             names[role] = name
-        return Topics(**names)
+        return names
 
 
 ReadingGroup = Annotated[Reading, Group("Reading the recordings")]
