@@ -53,17 +53,23 @@ def tiles(entries: Iterable[tuple[str, str]]) -> str:
 
 
 def table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], text_columns: Sequence[int] = (0,), wrap: Sequence[int] = ()
+    head: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    text_columns: Sequence[int] = (0,),
+    wrap: Sequence[int] = (),
+    names: Sequence[int] = (),
 ) -> str:
     """A table; columns not in ``text_columns`` are set as numbers, those in ``wrap`` may break even where there is room.
+
+    Those in ``names`` stay on one line, as text does.
 
     On a narrow screen each row becomes a block of lines, a heading and a value each, so that nothing lies outside the page.
     """
 
     def kind(column: int) -> str:
-        names = ["text"] if column in text_columns else ["number"]
-        names += ["wrap"] if column in wrap else []
-        return f' class="{" ".join(names)}"'
+        kinds = ["name"] if column in names else ["text"] if column in text_columns else ["number"]
+        kinds += ["wrap"] if column in wrap else []
+        return f' class="{" ".join(kinds)}"'
 
     def cell(column: int, text: str) -> str:
         heading = escape(head[column]) if column < len(head) else ""

@@ -50,7 +50,7 @@ class Alarm:
     Attributes:
         axis: index of the axis.
         day: index of the day on which it was found.
-        kind: ``step``, ``one day`` (a step that was gone the day after) or ``apart``.
+        kind: ``step``, ``apart``, or ``one day`` for what was gone the day after.
         size: how far the value is from what was expected, in the parameter's unit.
         z: the same in standard deviations of a normal distribution of the same probability, at its largest.
     """
@@ -220,5 +220,6 @@ def _apart(values: Array, level: float) -> list[Alarm]:
     for axis in np.flatnonzero((np.abs(z) > limit).any(axis=1)):
         days: Index = np.flatnonzero(np.abs(z[axis]) > limit)
         most = int(days[np.argmax(np.abs(z[axis, days]))])
-        found.append(Alarm(int(axis), int(days[0]), "apart", float(change[axis, most]), float(z[axis, most] / spread)))
+        kind = "one day" if days.size == 1 and days[0] < np.flatnonzero(np.isfinite(z[axis]))[-1] else "apart"
+        found.append(Alarm(int(axis), int(days[0]), kind, float(change[axis, most]), float(z[axis, most] / spread)))
     return found

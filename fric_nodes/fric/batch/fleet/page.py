@@ -58,7 +58,7 @@ def _first(fleet: Fleet) -> tuple[str, ...]:
         (str(k), i.axis, i.about, i.what, i.since, f"{i.z:+.1f}" if i.z else "") for k, i in enumerate(fleet.items[:_ROWS], 1)
     ]
     head = ("", "axis", "about", "what", "since", "standard deviations")
-    blocks = [tiles(entries), table(head, rows, text_columns=(1, 2, 3), wrap=(3,))]
+    blocks = [tiles(entries), table(head, rows, text_columns=(3,), wrap=(3,), names=(1, 2))]
     return (*blocks, *_more(len(fleet.items)))
 
 
@@ -146,7 +146,7 @@ def _deviation(values: Array) -> Array | None:
     left = without_common(values)
     filled = np.where(np.isfinite(left).any(axis=1)[:, None], left, 0.0)
     left = left - np.nanmedian(filled, axis=1)[:, None]
-    step = np.abs(np.diff(left, axis=1))
+    step: Array = np.abs(np.diff(left, axis=1))
     step = step[np.isfinite(step)]
     scatter = float(np.median(step)) / (np.sqrt(2.0) * float(ndtri(0.75))) if step.size else 0.0
     return np.asarray(left / scatter, dtype=np.float64) if scatter > 0.0 else None
@@ -169,7 +169,7 @@ def _drift(fleet: Fleet) -> list[Section]:
     ]
     head = ("axis", "parameter", "per 30 days", "95 % interval", "latest", "unit")
     note = paragraph(_DRIFT, "note")
-    return [Section("Drift", (note, table(head, rows, text_columns=(0, 1, 3, 5), wrap=(0, 1)), *_more(len(fleet.drifts))))]
+    return [Section("Drift", (note, table(head, rows, text_columns=(3, 5), names=(0, 1)), *_more(len(fleet.drifts))))]
 
 
 def _causes(fleet: Fleet) -> list[Section]:
@@ -205,7 +205,11 @@ def _values(fleet: Fleet) -> list[Section]:
                 f"{significant(row[p.name], 4)} ± {significant(wide, 2)}" if np.isfinite(wide) else significant(row[p.name], 4)
             )
         rows.append((str(axis), *cells))
-    return [Section("Newest values, with 95 % intervals", (table(head, rows), *_more(len(fleet.latest))))]
+    return [
+        Section(
+            "Newest values, with 95 % intervals", (table(head, rows, text_columns=(), names=(0,)), *_more(len(fleet.latest)))
+        )
+    ]
 
 
 def _refused(refused: pa.Table) -> tuple[str, ...]:
