@@ -144,7 +144,7 @@ def _maps(fleet: Fleet) -> list[Section]:
 def _deviation(values: Array) -> Array | None:
     """Distance of each axis from its median over the days, in the scatter from day to day; None where there is no scatter."""
     left = without_common(values)
-    filled = np.where(np.isfinite(left).any(axis=1)[:, None], left, 0.0)
+    filled = np.where(np.asarray(np.isfinite(left).any(axis=1))[:, None], left, 0.0)
     left = left - np.nanmedian(filled, axis=1)[:, None]
     step: Array = np.abs(np.diff(left, axis=1))
     step = step[np.isfinite(step)]
