@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,7 +86,7 @@ def run_batch(
             spent, memory = spent + 1, max(memory, entry["memory"])
             refused += any(row["status"] == "refused" for row in entry["rows"])
             progress(len(done) + len(fresh), len(found.recordings), refused)
-        table = table_of(_places(found.recordings, done, fresh, journal), job, naming)
+        table = table_of(_places(done, fresh, journal), job, naming)
     write_table(table, out / "results.parquet")
     return Batch(table, tuple(names_of_parameters(job)), spent, memory)
 
@@ -105,17 +105,15 @@ def _known(path: str, job: Job, journal: Journal) -> str:
     return key if key in journal.known else ""
 
 
-def _places(
-    paths: Sequence[str], done: dict[str, str], fresh: dict[str, Entry], journal: Journal
-) -> Iterator[tuple[str, Entry]]:
-    """Path and entry of each recording, in the order of the paths.
+def _places(done: Mapping[str, str], fresh: Mapping[str, Entry], journal: Journal) -> Iterator[tuple[str, Entry]]:
+    """Path and entry of each recording, one entry in memory at a time.
 
     Of entries with one key, the first that was kept: the same content at two places has one result.
     """
-    wanted = set(done.values())
-    held: dict[str, Entry] = {}
+    places: dict[str, list[str]] = {}
+    for path, key in done.items():
+        places.setdefault(key, []).append(path)
     for entry in journal.entries():
-        if entry["key"] in wanted and not entry.get("again"):
-            held.setdefault(entry["key"], entry)
-    for path in paths:
-        yield path, fresh[path] if path in fresh else held[done[path]]
+        if not entry.get("again"):
+            yield from ((path, entry) for path in places.pop(entry["key"], ()))
+    yield from fresh.items()

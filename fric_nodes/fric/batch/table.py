@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..errors import InputError
@@ -103,10 +104,10 @@ def schema(job: Job) -> pa.Schema:
 
 
 def table_of(places: Iterable[tuple[str, Entry]], job: Job, naming: Naming) -> pa.Table:
-    """The table.
+    """The table, in the order of the paths.
 
     Args:
-        places: path of each recording and what came of it.
+        places: path of each recording and what came of it, in any order.
         job: what was asked.
         naming: of the axes.
     """
@@ -119,7 +120,8 @@ def table_of(places: Iterable[tuple[str, Entry]], job: Job, naming: Naming) -> p
             batches.append(pa.RecordBatch.from_pylist(rows, schema=form))
             rows = []
     batches.append(pa.RecordBatch.from_pylist(rows, schema=form))
-    return pa.Table.from_batches(batches, schema=form)
+    table = pa.Table.from_batches(batches, schema=form)
+    return table.take(pc.sort_indices(table, sort_keys=[("path", "ascending")]))  # stable: joints stay as they come
 
 
 def _row(path: str, entry: Entry, row: Mapping[str, Any], naming: Naming) -> dict[str, Any]:

@@ -108,10 +108,13 @@ def fleet_of(table: pa.Table, parameters: Sequence[str], units: Mapping[str, str
         parameters: names of the model's parameters.
         units: of the parameters, by name.
     """
-    frame = table.to_pandas()
+    ends = [f"{name}{end}" for name in parameters for end in ("", ".lower", ".upper")]
+    # What else the table holds is taken for the newest rows alone: lists of 10^6 rows are no matter for pandas.
+    frame = table.select(["axis", "joint", "time", "status", "refusal", *ends]).to_pandas()
     good = frame[frame["status"] == "ok"]
     dated = good[good["time"].notna()]
-    latest = good.sort_values("time", na_position="first", kind="stable").groupby("axis", sort=True).tail(1).set_index("axis")
+    newest = good.sort_values("time", na_position="first", kind="stable").groupby("axis").tail(1).index
+    latest = table.take(pa.array(newest.to_numpy(), pa.int64())).to_pandas().set_index("axis").sort_index()
     axes = tuple(sorted(dated["axis"].unique()))
     ordinal = dated["time"].dt.floor("D")
     days = pd.date_range(ordinal.min(), ordinal.max(), freq="D") if len(dated) else pd.DatetimeIndex([])
