@@ -132,3 +132,12 @@ def test_axes_with_the_same_causes_are_put_together() -> None:
     assert cluster[0] == "backlash"
     assert cluster[1] == tuple(f"machine_{k:03d}/slide" for k in range(3))
     assert cluster[2] == pytest.approx(0.9)
+
+
+def test_correlated_scatter_keeps_the_rate() -> None:
+    generator = np.random.default_rng(9)
+    left = generator.standard_normal((AXES, 90))
+    for day in range(1, 90):
+        left[:, day] = 0.7 * left[:, day - 1] + np.sqrt(1.0 - 0.7**2) * left[:, day]
+    found = alarms_of(10.0 + 0.1 * left[:, 30:], np.full((AXES, DAYS), 0.05), len(NAMES))
+    assert len(NAMES) * len(found) < 1e-3 * AXES * DAYS

@@ -73,6 +73,8 @@ def _is_name(command: str) -> bool:
         return False
     if words[-1] in {"…", "NAME", "--help"} or command in {"fric verify", "fric prove"}:
         return True
+    if words[1] == "batch":
+        return len(words) <= 3 and words[-1] in {"batch", "diagnose", "doctor", "identify"}
     return words[1] in _ON_FILES and (len(words) == 2 or words[2].startswith("--"))
 
 
@@ -275,17 +277,21 @@ KNOWN: dict[str, Case] = {
     **{f"fric verify {it}": _LONGEST for it in ("--out verification.html", "compensation-guideway", "compensation-robust")},
     **{f"fric compete{how}": _LONGEST for how in ("", " --out competition.html", " --quick --out competition.html")},
     **dict.fromkeys(("fric demo", "fric demo --clock wall"), _LONGEST),
+    "fric batch identify bags --terms coulomb,viscous,bias --out fleet": Case(),
     **{
         f"fric {name}": _JUDGED
         for name in (
             "prove --cases 300 --seed 110 --out proof",
             "prove --inject bags/slide --model config/nominal_model.yaml --out proof",
             *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),
-            *(f"bench {each}" for each in ("tensor-product-control", "compensation", "circle", "calibration")),
+            *(f"bench {each}" for each in ("batch", "tensor-product-control", "compensation", "circle", "calibration")),
             *(f"bench calibration-{each}" for each in ("oscillation", "forced", "static", "two-stage", "tensor-product")),
         )
     },
-    "pip install 'fric[can]'": Case(checked=lambda: "\ncan = [" in (ROOT / "pyproject.toml").read_text(encoding="utf-8")),
+    **{
+        f"pip install 'fric[{name}]'": Case(checked=lambda name=name: f"\n{name} = [" in (ROOT / "pyproject.toml").read_text())
+        for name in ("batch", "can")
+    },
     f"{_BRIDGE} -p driver:=serial -p serial.port:=/dev/ttyACM0": Case(node="hardware_bridge"),
     **{f"ros2 lifecycle set /pid {step}": _ASKED for step in ("configure", "activate")},
     **{f"ros2 service call /{of} std_srvs/srv/Trigger": _ASKED for of in _SERVICES},

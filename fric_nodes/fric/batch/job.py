@@ -35,8 +35,8 @@ _VERSION = f"{__version__}/1"
 """Results of another version are worked out anew; the number after the stroke counts changes of the rows."""
 
 Entry = dict[str, Any]
-"""What is known of one recording: ``signature``, ``hash``, ``key``, ``rows``, ``seconds``, ``memory``, and ``again`` where the
-next run tries once more."""
+"""What is known of one recording: ``signature``, ``hash``, ``key``, ``rows``, ``seconds`` of a core, ``memory`` [byte], and
+``again`` where the next run tries once more."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def work(path: str, job: Job) -> Entry:
         path: path or URL of the recording.
         job: what is asked.
     """
-    begun = time.perf_counter()
+    begun = time.process_time()
     entry: Entry = {"signature": job.signature(path), "hash": "", "key": "", "rows": []}
     try:
         with here(path) as place:
@@ -147,7 +147,7 @@ def work(path: str, job: Job) -> Entry:
     # What could not even be read may be readable next time.
     if not entry["key"]:
         entry["again"] = True
-    entry["seconds"] = time.perf_counter() - begun
+    entry["seconds"] = time.process_time() - begun
     entry["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     return entry
 

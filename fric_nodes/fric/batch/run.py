@@ -28,12 +28,14 @@ class Batch:
         table: a row per joint and recording.
         parameters: names of the model's parameters.
         worked: how many recordings were worked on now; the others had been before.
+        seconds: of one core that this took [s].
         memory: largest memory of a worker [byte], of the recordings worked on now.
     """
 
     table: pa.Table
     parameters: tuple[str, ...]
     worked: int
+    seconds: float
     memory: int
 
     @property
@@ -67,7 +69,7 @@ def run_batch(
     naming = naming or Naming(found.recordings)
     done: dict[str, str] = {}  # key of the result, by path
     fresh: dict[str, Entry] = {}  # what has no key, by path
-    spent, memory, refused = 0, 0, 0
+    spent, seconds, memory, refused = 0, 0.0, 0, 0
     with Journal(out / "journal" / job.digest[:12]) as journal:
         waiting: list[str] = []
         for path in found.recordings:
@@ -83,12 +85,12 @@ def run_batch(
                 done[path] = entry["key"]
             else:
                 fresh[path] = entry
-            spent, memory = spent + 1, max(memory, entry["memory"])
+            spent, seconds, memory = spent + 1, seconds + entry["seconds"], max(memory, entry["memory"])
             refused += any(row["status"] == "refused" for row in entry["rows"])
             progress(len(done) + len(fresh), len(found.recordings), refused)
         table = table_of(_places(done, fresh, journal), job, naming)
     write_table(table, out / "results.parquet")
-    return Batch(table, tuple(names_of_parameters(job)), spent, memory)
+    return Batch(table, tuple(names_of_parameters(job)), spent, seconds, memory)
 
 
 def _known(path: str, job: Job, journal: Journal) -> str:

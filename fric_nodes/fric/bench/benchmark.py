@@ -19,9 +19,11 @@ class Benchmark:
         title: what is measured, in a few words.
         run: gives its figures.
         long: takes minutes: run only when named, or with all the others when all are asked for.
+        sized: gives its figures for so many recordings; None where their number is fixed.
     """
 
     id: str
     title: str
     run: Callable[[], list[Figure]]
     long: bool = False
+    sized: Callable[[int], list[Figure]] | None = None

@@ -30,6 +30,7 @@ def bench(
     everything: Annotated[bool, typer.Option("--all", help="All benchmarks, the long ones too.")] = False,
     listed: Annotated[bool, typer.Option("--list", help="List the benchmarks, and measure nothing.")] = False,
     graph: Annotated[bool, typer.Option("--graph", help="With 'faults': in the running graph; takes half an hour.")] = False,
+    recordings: Annotated[int | None, typer.Option("--recordings", help="With 'batch': how many to make and work on.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed and accuracy on this machine; exit status 1 when a goal is missed."""
@@ -46,10 +47,13 @@ def bench(
     for name in chosen:
         if name not in BENCHMARKS:
             raise InputError("fric bench", f"no benchmark '{name}'", f"choose from {', '.join(BENCHMARKS)}")
+    if recordings is not None and (recordings < 1 or not any(BENCHMARKS[name].sized for name in chosen)):
+        raise InputError("--recordings", "goes with the benchmark 'batch'", "fric bench batch --recordings 1000")
     figures = []
     for name in chosen:
         progress(f"measuring {BENCHMARKS[name].title}")
-        figures += BENCHMARKS[name].run()
+        sized = BENCHMARKS[name].sized
+        figures += BENCHMARKS[name].run() if sized is None or recordings is None else sized(recordings)
     if as_json:
         typer.echo(
             json.dumps(
