@@ -86,7 +86,7 @@ def test_doctor_and_a_mapping(tmp_path: Path, command: Command) -> None:
         (["LOGS", "--workers", "-1"], "give 0 or more"),
         (["LOGS", "--time", "noon"], "use stamp or log"),
         (["LOGS", "--terms", "glue"], "glue"),
-        (["LOGS", "--workers", "1", "--memory", "much"], "check the address, --workers and --memory"),
+        (["LOGS", "--workers", "1", "--memory", "much"], "which is no size"),
         (["nostore://bucket/x"], "cannot be opened"),
     ],
 )

@@ -10,14 +10,18 @@ import subprocess
 import sys
 import time
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import fric
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from fric.batch.fleet.look import Item, fleet_of
+from fric.batch.fleet.page import fleet_page
 from fric.batch.job import Job
 from fric.batch.journal import Journal
+from fric.batch.notable import reports_of
 from fric.batch.pool import ALONE, Workers
 from fric.batch.recordings import find
 from fric.batch.run import Batch, run_batch
@@ -127,6 +131,17 @@ def test_kills_lose_nothing_and_change_nothing(good: Path, job: Job, tmp_path: P
 def _lines(out: Path) -> list[bytes]:
     held = [path.read_bytes() for path in out.glob("journal/*/journal.jsonl")]
     return [line for text in held for line in text.splitlines(keepends=True) if line.endswith(b"\n")]
+
+
+def test_what_comes_first_has_its_report(good: Path, job: Job, tmp_path: Path) -> None:
+    found = run(good, job, tmp_path, axis="machine_[0-9]+")
+    fleet = fleet_of(found.table, found.parameters)
+    items = tuple(Item(axis, "mass", "steps", "2026-03-02", 9.0) for axis in ("machine_2/axis", "nowhere", "machine_2/axis"))
+    pages, names, failed = reports_of(replace(fleet, items=items), job, 3)
+    assert (list(pages), names, failed) == (["01_machine_2_axis.html"], {"machine_2/axis": "01_machine_2_axis.html"}, [])
+    assert "coulomb.force" in pages["01_machine_2_axis.html"]
+    page = fleet_page(fleet, found.table, "identify", {"machine_2/axis": "reports/a b.html"})
+    assert '<a href="reports/a%20b.html">machine_2/axis</a>' in page
 
 
 # The journal

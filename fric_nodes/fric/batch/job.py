@@ -29,7 +29,7 @@ from ..record import Record
 from .recordings import content_hash, here, is_storage, signature
 from .task import Task, task_of
 
-__all__ = ["Entry", "Job", "lost", "work"]
+__all__ = ["Entry", "Job", "lost", "read_joint", "work"]
 
 _VERSION = f"{__version__}/1"
 """Results of another version are worked out anew; the number after the stroke counts changes of the rows."""
@@ -164,7 +164,7 @@ def _rows(place: Path, job: Job) -> list[dict[str, Any]]:
     for joint in _joints(place, job):
         row: dict[str, Any] = {"joint": joint or "", "time_ns": begin, "status": "ok"}
         try:
-            record = _read(place, job, joint)
+            record = read_joint(place, job, joint)
             row |= {
                 "joint": record.joint,
                 "duration": float(record.time[-1]),
@@ -189,7 +189,12 @@ def _joints(place: Path, job: Job) -> list[str | None]:
     return [*dict.fromkeys(found)] or [None]
 
 
-def _read(place: Path, job: Job, joint: str | None) -> Record:
+def read_joint(place: Path, job: Job, joint: str | None) -> Record:
+    """One joint of a recording, as the job says.
+
+    Raises:
+        InputError: it cannot be used.
+    """
     return read(
         place,
         joint=joint,

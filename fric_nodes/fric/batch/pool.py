@@ -119,11 +119,15 @@ def _remote_work(path: str, job: Job) -> Entry:
 @contextmanager
 def _client(workers: Workers) -> Iterator[Any]:
     try:
-        import dask
+        import dask.utils
         from distributed import Client, LocalCluster
     except ImportError:
         remedy = "pip install 'fric[batch]', or work in this process with --workers 0"
         raise InputError("fric batch", "needs the package distributed for its workers", remedy) from None
+    try:
+        dask.utils.parse_bytes(workers.memory)
+    except ValueError:
+        raise InputError("--memory", f"is '{workers.memory}', which is no size", "give one such as 2GB or 800MB") from None
     settings = {
         # What was on a worker that died comes back at once: it is tried again by itself.
         "distributed.scheduler.allowed-failures": 0,
@@ -146,13 +150,13 @@ def _client(workers: Workers) -> Iterator[Any]:
                         processes=True,
                         memory_limit=workers.memory,
                         host="127.0.0.1",  # this machine alone
-                        dashboard_address=None,
+                        dashboard_address="127.0.0.1:0",  # any port: several runs at once must not meet
                         silence_logs=logging.CRITICAL,
                     )
                 )
                 client = stack.enter_context(Client(cluster, set_as_default=False))
             client.wait_for_workers(1, timeout=_START)
-        except (OSError, TimeoutError, ValueError) as error:
+        except (OSError, TimeoutError, ValueError, RuntimeError) as error:
             where = workers.scheduler or "--workers"
             raise InputError(where, f"gives no workers ({error})", "check the address, --workers and --memory") from None
         yield client

@@ -28,12 +28,14 @@ class Task:
         id: the verb.
         columns: names and Arrow types of the columns that its rows have beside the parameters.
         run: recording, model and settings to the values of these columns, and ``parameters`` as of :func:`estimates`.
+        report: recording, model and settings to a page; None where there is none.
         has_parameters: its rows hold the model's parameters.
     """
 
     id: str
     columns: Callable[[], Mapping[str, pa.DataType]] = field(repr=False)
     run: Callable[[Record, Model | None, Mapping[str, Any]], dict[str, Any]] = field(repr=False)
+    report: Callable[[Record, Model, Mapping[str, Any]], str] | None = field(default=None, repr=False)
     has_parameters: bool = True
 
 

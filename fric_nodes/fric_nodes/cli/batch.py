@@ -20,6 +20,7 @@ from .results import Record as ResultRecord
 from .results import Results, ResultsGroup
 
 if TYPE_CHECKING:
+    from fric.batch.job import Job
     from fric.batch.run import Batch
 
 __all__ = ["Progress", "register"]
@@ -57,17 +58,20 @@ class _Recordings(Reading):
 
 @dataclass(frozen=True)
 class _Workers:
-    """Who does the work."""
+    """Who does the work, and how much is told of it."""
 
     workers: Annotated[
         int | None, typer.Option("--workers", help="Processes to start; 0: this process alone. If not given: one per core.")
     ] = None
     memory: Annotated[str, typer.Option("--memory", help="Memory of each; a recording that needs more is reported.")] = "2GB"
+    reports: Annotated[
+        int, typer.Option("--reports", help="Full reports to write of recordings that come first; takes the time of as many.")
+    ] = 3
     scheduler: Annotated[str, typer.Option("--scheduler", help="Address of a Dask scheduler, in place of --workers.")] = ""
 
 
 RecordingsGroup = Annotated[_Recordings, Group("Recordings")]
-WorkersGroup = Annotated[_Workers, Group("Workers")]
+WorkersGroup = Annotated[_Workers, Group("Workers and reports")]
 _STATUS = "Exit status 1 when some recordings were refused."
 
 
@@ -181,7 +185,7 @@ def _batch(
         found, job, results.out, naming=naming, workers=Workers(number, workers.memory, workers.scheduler), progress=shown
     )
     shown.end()
-    _finish(verb, job, batch, results, time.monotonic() - begun)
+    _finish(verb, job, batch, results, time.monotonic() - begun, workers.reports)
 
 
 def _mapping_text(path: Path | None) -> str:
@@ -193,15 +197,24 @@ def _mapping_text(path: Path | None) -> str:
     return path.read_text(encoding="utf-8")
 
 
-def _finish(verb: str, job: Any, batch: Batch, results: Results, spent: float) -> None:
+def _finish(verb: str, job: Job, batch: Batch, results: Results, spent: float, reports: int) -> None:
     """Write the page and the record, print what came of it, and end with the status."""
     from fric.batch.fleet.look import fleet_of
     from fric.batch.fleet.page import fleet_page
+    from fric.batch.notable import reports_of
     from fric.files import write_text
 
     model = job.parsed_model
     units = {} if model is None else {p.name: p.declaration.unit(model.units) for p in model.parameters()}
     fleet = fleet_of(batch.table, batch.parameters, units)
+    pages, names, failed = reports_of(fleet, job, reports)
+    for line in failed:
+        progress(line)
+    for old in (results.out / "reports").glob("[0-9][0-9]_*.html"):
+        old.unlink()  # of an earlier run, whose axes may come first no longer
+    for name, page in pages.items():
+        write_text(results.out / "reports" / name, page)
+    links = {axis: f"reports/{name}" for axis, name in names.items()}
     summary = {
         "format": _RECORD.form,
         "verb": verb,
@@ -211,7 +224,7 @@ def _finish(verb: str, job: Any, batch: Batch, results: Results, spent: float) -
         "axis_days": fleet.axis_days,
         "first": [vars(item) for item in fleet.items[:20]],
     }
-    write_text(results.out / "fleet.html", fleet_page(fleet, batch.table, verb))
+    write_text(results.out / "fleet.html", fleet_page(fleet, batch.table, verb, links))
     write_text(results.out / _RECORD.name, json.dumps(summary, indent=2) + "\n")
     if results.as_json:
         typer.echo(json.dumps(summary))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from html import escape
+from urllib.parse import quote
 
 import numpy as np
 import plotly.graph_objects as go
@@ -28,11 +30,18 @@ _DRIFT = "Slopes that the days show, the largest part of the value first; 5 % of
 _COLOURS_TO = 6.0  # [standard deviations] at which the colours of a map end (layout)
 
 
-def fleet_page(fleet: Fleet, results: pa.Table, verb: str) -> str:
-    """The page as text."""
+def fleet_page(fleet: Fleet, results: pa.Table, verb: str, reports: Mapping[str, str] | None = None) -> str:
+    """The page as text.
+
+    Args:
+        fleet: what is known of all axes.
+        results: the table.
+        verb: by which it was made.
+        reports: links to reports of single recordings, by axis.
+    """
     refused = results.filter(pc.equal(results["status"], "refused"))
     sections = [
-        Section("What to look at first", _first(fleet)),
+        Section("What to look at first", (*_first(fleet), *_links(reports or {}))),
         *_plots(fleet),
         *_maps(fleet),
         *_drift(fleet),
@@ -60,6 +69,13 @@ def _first(fleet: Fleet) -> tuple[str, ...]:
     head = ("", "axis", "about", "what", "since", "standard deviations")
     blocks = [tiles(entries), table(head, rows, text_columns=(3,), wrap=(3,), names=(1, 2))]
     return (*blocks, *_more(len(fleet.items)))
+
+
+def _links(reports: Mapping[str, str]) -> tuple[str, ...]:
+    if not reports:
+        return ()
+    links = (f'<a href="{escape(quote(link), quote=True)}">{escape(axis)}</a>' for axis, link in reports.items())
+    return (f'<p class="note">Reports of the newest recordings: {", ".join(links)}.</p>',)
 
 
 def _more(count: int) -> tuple[str, ...]:

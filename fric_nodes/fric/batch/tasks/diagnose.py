@@ -8,7 +8,7 @@ from typing import Any
 import pyarrow as pa
 
 from ...errors import InputError
-from ...facade.diagnosing import diagnose
+from ...facade.diagnosing import Diagnosed, diagnose
 from ...model import Model
 from ...record import Record
 from ..task import Task, estimates, number
@@ -16,10 +16,14 @@ from ..task import Task, estimates, number
 __all__ = ["TASK"]
 
 
+def _found(record: Record, model: Model, settings: Mapping[str, Any]) -> Diagnosed:
+    return diagnose(record, model, blocks=int(settings.get("blocks", 6)))
+
+
 def _run(record: Record, model: Model | None, settings: Mapping[str, Any]) -> dict[str, Any]:
     if model is None:
         raise InputError("diagnose", "has no model", "give --model")
-    found = diagnose(record, model, blocks=int(settings.get("blocks", 6))).result
+    found = _found(record, model, settings).result
     causes = [
         {
             "effect": each.effect,
@@ -81,4 +85,5 @@ TASK = Task(
         "force_error": pa.float64(),
     },
     _run,
+    lambda record, model, settings: _found(record, model, settings).report(),
 )

@@ -38,4 +38,5 @@ TASK = Task(
         "warnings": pa.list_(pa.string()),
     },
     _run,
+    lambda record, model, settings: identify(record, model, **settings).report(),
 )
