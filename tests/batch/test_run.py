@@ -227,6 +227,12 @@ def test_axes_and_times_come_from_the_path() -> None:
     assert str(naming.time(paths[0], None)) == "2026-05-01 07:00:00+00:00"
     assert naming.time(paths[2], None) is None
     assert Naming(paths).axis(paths[0], "j") == "m1/2026-05-01T07/j"
+    beside = ["m1/a", "m2/a"]
+    assert [Naming(beside).axis(path, "j") for path in beside] == ["m1/j", "m2/j"]
+    stored = ["s3://store/logs/m1/a", "s3://store/logs/m2/a"]
+    assert [Naming(stored).axis(path, "j") for path in stored] == ["m1/j", "m2/j"]
+    assert Naming(["m1/a", f"{Path.cwd()}/m2/a"]).axis("m1/a", "j") == "m1/j"
+    assert Naming(beside[:1]).axis("m1/a", "") == ""
     with pytest.raises(fric.InputError, match="no regular expression"):
         Naming(paths, "(")
     with pytest.raises(fric.InputError, match="is in no path"):

@@ -41,7 +41,8 @@ class Naming:
         if self._pattern is not None and not any(self._pattern.search(path) for path in recordings):
             raise InputError("--axis", f"'{pattern}' is in no path, such as {recordings[0]}", "give one that matches paths")
         folders = [_folder(path) for path in recordings]
-        self._common = os.path.commonpath(folders) if len(folders) > 1 and not any(map(is_remote, folders)) else ""
+        alike = len({is_remote(path) for path in recordings}) == 1
+        self._common = os.path.commonpath(folders) if alike else ""
 
     def axis(self, path: str, joint: str) -> str:
         """Name of the axis; of the machine alone where the joint is not known."""
@@ -49,7 +50,7 @@ class Naming:
 
     def _machine(self, path: str) -> str:
         if self._pattern is None:
-            folder = os.path.relpath(_folder(path), self._common) if self._common else "."
+            folder = os.path.relpath(_folder(path), self._common) if self._common else _folder(path)
             return "" if folder == "." else folder
         found = self._pattern.search(path)
         if found is None:
@@ -74,7 +75,7 @@ class Naming:
 
 
 def _folder(path: str) -> str:
-    return path.rstrip("/").rpartition("/")[0] or "."
+    return path.rstrip("/").rpartition("/")[0] if is_remote(path) else str(Path(path).absolute().parent)
 
 
 def names_of_parameters(job: Job) -> list[str]:

@@ -13,16 +13,21 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 
 import numpy as np
 
 from ...bagio.write import write_record
-from ...batch.job import Job
+from ...batch.fleet.look import fleet_of
+from ...batch.fleet.page import fleet_page
+from ...batch.job import Entry, Job
+from ...batch.journal import Journal
 from ...batch.pool import Workers
 from ...batch.recordings import find
 from ...batch.run import Batch, run_batch
+from ...batch.table import Naming, names_of_parameters, table_of, write_table
 from ...facade.structure import model_from
 from ...figure import Figure
 from ...model import build_model, term
@@ -41,6 +46,7 @@ _DAY = 86_400 * 10**9  # [ns]
 _FIRST = 1_772_323_200 * 10**9  # [ns since 1970]
 _BROKEN = 100  # one in so many
 _KILLS = 5
+_RESULTS = 20_000  # made up, to be put together
 _CODE = (
     "import sys; from pathlib import Path; from fric.bench.benchmarks.batch import worked; "
     "worked(Path(sys.argv[1]), Path(sys.argv[2]), 2)"
@@ -75,8 +81,7 @@ def made(folder: Path, number: int) -> int:
 
 def worked(folder: Path, out: Path, workers: int) -> Batch:
     """All recordings of a folder through ``identify``."""
-    job = Job("identify", model_to_text(model_from("coulomb,viscous,bias")))
-    return run_batch(find([str(folder)], mapped=False), job, out, workers=Workers(workers))
+    return run_batch(find([str(folder)], mapped=False), _job(), out, workers=Workers(workers))
 
 
 def _timed(folder: Path, out: Path, workers: int) -> tuple[Batch, float]:
@@ -108,6 +113,46 @@ def _lines(out: Path) -> int:
     return sum(path.read_bytes().count(b"\n") for path in out.glob("journal/*/journal.jsonl"))
 
 
+def _entry(k: int, names: Sequence[str], generator: np.random.Generator) -> Entry:
+    """A finished recording, made up: one of a hundred days of an axis."""
+    axes = _RESULTS // 100
+    values = (10.0 + generator.standard_normal(len(names))).tolist()
+    row = {
+        "joint": "slide",
+        "time_ns": _FIRST + k // axes * _DAY,
+        "status": "ok",
+        "duration": _DURATION,
+        "rate": _RATE,
+        "parameters": {name: [value, value - 0.1, value + 0.1] for name, value in zip(names, values, strict=True)},
+        "verdict": "converged; every fitted parameter is determined",
+    }
+    key = f"{k:032x}"
+    return {"signature": key, "hash": key, "key": key, "rows": [row], "seconds": 0.3, "memory": 0}
+
+
+def _put_together(folder: Path) -> tuple[float, float]:
+    """Time to make table and page of finished results, per 1,000 of them [s], and what the results take on the disk [byte]."""
+    job, generator = _job(), np.random.default_rng(12)
+    names = names_of_parameters(job)
+    with Journal(folder) as journal:
+        for k in range(_RESULTS):
+            journal.add(_entry(k, names, generator))
+        start = time.perf_counter()
+        places = ((f"machine_{k % (_RESULTS // 100)}/{entry['key']}", entry) for k, entry in enumerate(journal.entries()))
+        table = table_of(places, job, Naming(["machine_0/0", "machine_1/0"]))
+        write_table(table, folder / "results.parquet")
+        page = fleet_page(fleet_of(table, names), table, job.verb)
+        spent = time.perf_counter() - start
+    if "machine_" not in page:
+        raise RuntimeError("the page shows no axis")
+    size = sum(path.stat().st_size for path in folder.iterdir())
+    return 1e3 * spent / _RESULTS, size / _RESULTS
+
+
+def _job() -> Job:
+    return Job("identify", model_to_text(model_from("coulomb,viscous,bias")))
+
+
 def run(number: int = _RECORDINGS) -> list[Figure]:
     """Throughput with one worker and with two, and what kills cost."""
     root = Path(tempfile.mkdtemp(prefix="fric-batch-"))
@@ -121,6 +166,7 @@ def run(number: int = _RECORDINGS) -> list[Figure]:
         killed = time.perf_counter() - start
         texts = [(root / name / "results.parquet").read_bytes() for name in ("one", "two", "killed")]
         again = _timed(root / "logs", root / "one", 1)[1]
+        per_thousand, size_of_result = _put_together(root / "results")
     finally:
         shutil.rmtree(root, ignore_errors=True)
     paths = two.table["path"].to_pylist()
@@ -135,6 +181,8 @@ def run(number: int = _RECORDINGS) -> list[Figure]:
         Figure(f"two workers, killed {kills} times on the way", number / killed, "1/s"),
         Figure("runs with the same results, to the last byte", float(texts.count(texts[0])), "1", "== 3"),
         Figure("a run with nothing left to do", again, "s"),
+        Figure(f"table and page, per 1,000 results ({_RESULTS:,} of them)", per_thousand, "s"),
+        Figure("a result on the disk, in journal and table", size_of_result, "byte"),
     ]
 
 
