@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from fric.bench.dirty_axis import drawn, recorded
 from fric.identification import METHODS
-from fric.identification.result import Options
+from fric.identification.result import IdentificationError, Options
 from fric.model import Model, Term, build_model, term
+from fric.signals.conditioning import conditioned
 
 FIT = METHODS["prediction-error"].fit
 
@@ -59,3 +61,10 @@ def test_what_acts_without_being_in_the_noise_of_the_record_is_not_corrected_awa
     found = FIT(model, [bristled.record(resolution=1e-8)], Options())
     assert found.model.value("presliding.damping") == pytest.approx(400.0, rel=0.02)
     assert found.model.value("mass") == pytest.approx(2.0, rel=0.002)
+
+
+def test_a_mass_that_comes_out_at_nothing_is_refused() -> None:
+    # 1710 encoder steps at 4.4 kHz, spikes of 50 times the force, pink noise and mains: innovations that hold no motion.
+    axis, dirt = drawn(40083)
+    with pytest.raises(IdentificationError, match="'mass' comes out at nothing; use the method output-error"):
+        FIT(structure(), [conditioned(recorded(axis, dirt, 40083))], Options())

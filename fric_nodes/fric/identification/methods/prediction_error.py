@@ -53,7 +53,7 @@ from ..free_parameters import FreeParameters, candidates
 from ..gauss_newton import Solution, minimise
 from ..innovations import SETTLING, Run, excerpt, innovations, runs_of
 from ..problem import Problem
-from ..result import Identification, Method, Options
+from ..result import Identification, IdentificationError, Method, Options
 from ..statistics import bartlett_lag, by_parts, definite, parts_of
 from . import inverse_dynamics
 
@@ -68,6 +68,7 @@ _MOST_STEPS = 40
 _DRAWS = 3  # of the noise
 _NEARLY_ALL = 0.8  # of the innovations' power, from which on noise is taken to be all of it
 _ROUNDS = 3  # at most, of noise and tracking index found, and fit
+_NOTHING = 1e-6  # numerical: of the value by inverse dynamics
 _SETTLED = 0.1  # change of the share of noise that needs no further round
 
 
@@ -295,11 +296,22 @@ def problem(model: Model, free: FreeParameters, records: Sequence[Record], found
     return _prepared(model, free.within_reach(model, found), runs, share).problem()
 
 
+def _refuse_nothing(model: Model, start: Model, source: str) -> None:
+    """Refuse an inertia or a stiffness that comes out at nothing beside its value in ``start``."""
+    for p in model.parameters():
+        if p.declaration.positive and p.value < _NOTHING * start.value(p.name):
+            raise IdentificationError(
+                source,
+                f"from sample to sample its noise hides what the force moves: '{p.name}' comes out at nothing",
+                "use the method output-error or inverse-dynamics",
+            )
+
+
 def fit(structure: Model, records: Sequence[Record], options: Options) -> Identification:
     """Fit ``structure`` to ``records`` by prediction error.
 
     Raises:
-        IdentificationError: the recordings can't determine it.
+        IdentificationError: the recordings can't determine it, or what must be positive comes out at nothing.
     """
     begun = inverse_dynamics.fit_force(structure, records, options)
     start, free, found = begun.model, begun.free, begun.found
@@ -310,6 +322,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     model = _best_start(start, free, excerpt(runs, _ENOUGH), _other_starts(start, free, found))
     starts = np.cumsum([0, *(run.effort.shape[0] - SETTLING for run in runs)])[:-1]
     model, answer, problem = _settled(model, free, runs)
+    _refuse_nothing(model, start, records[0].source)
     covariance = replace(problem, model=model).covariance(starts)
     remedy = "start nearer to the machine's values (--model)"
     trouble = "" if answer.converged else f"not converged after {_MOST_STEPS} steps; {remedy}"
