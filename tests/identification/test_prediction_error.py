@@ -63,6 +63,7 @@ def test_what_acts_without_being_in_the_noise_of_the_record_is_not_corrected_awa
     assert found.model.value("mass") == pytest.approx(2.0, rel=0.002)
 
 
+@pytest.mark.long
 def test_a_mass_that_comes_out_at_nothing_is_refused() -> None:
     # 1710 encoder steps at 4.4 kHz, spikes of 50 times the force, pink noise and mains: innovations that hold no motion.
     axis, dirt = drawn(40083)

@@ -296,10 +296,16 @@ def problem(model: Model, free: FreeParameters, records: Sequence[Record], found
     return _prepared(model, free.within_reach(model, found), runs, share).problem()
 
 
+def _above_nothing(free: FreeParameters, start: Model) -> FreeParameters:
+    """``free`` with what must be positive kept above nearly nothing, so that no step makes a prediction infinite."""
+    least = {p.name: _NOTHING * p.value for p in start.parameters() if p.declaration.positive}
+    return replace(free, lower=np.maximum(free.lower, [least.get(name, -math.inf) for name in free.names]))
+
+
 def _refuse_nothing(model: Model, start: Model, source: str) -> None:
-    """Refuse an inertia or a stiffness that comes out at nothing beside its value in ``start``."""
+    """Refuse an inertia or a stiffness that comes out at nearly nothing beside its value in ``start``."""
     for p in model.parameters():
-        if p.declaration.positive and p.value < _NOTHING * start.value(p.name):
+        if p.declaration.positive and p.value < 2.0 * _NOTHING * start.value(p.name):
             raise IdentificationError(
                 source,
                 f"from sample to sample its noise hides what the force moves: '{p.name}' comes out at nothing",
@@ -318,7 +324,7 @@ def fit(structure: Model, records: Sequence[Record], options: Options) -> Identi
     known = standard_errors(free, begun.covariance)
     free = free.without({name for name in free.names if name not in known})
     runs = [run for record in records for run in runs_of(record)]
-    free = free.within_reach(start, found)
+    free = _above_nothing(free.within_reach(start, found), start)
     model = _best_start(start, free, excerpt(runs, _ENOUGH), _other_starts(start, free, found))
     starts = np.cumsum([0, *(run.effort.shape[0] - SETTLING for run in runs)])[:-1]
     model, answer, problem = _settled(model, free, runs)
