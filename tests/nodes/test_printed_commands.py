@@ -284,7 +284,10 @@ KNOWN: dict[str, Case] = {
             "prove --cases 300 --seed 110 --out proof",
             "prove --inject bags/slide --model config/nominal_model.yaml --out proof",
             *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),
-            *(f"bench {each}" for each in ("batch", "tensor-product-control", "compensation", "circle", "calibration")),
+            *(
+                f"bench {each}"
+                for each in ("batch", "wall-time", "tensor-product-control", "compensation", "circle", "calibration")
+            ),
             *(f"bench calibration-{each}" for each in ("oscillation", "forced", "static", "two-stage", "tensor-product")),
         )
     },
