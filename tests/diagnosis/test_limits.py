@@ -75,3 +75,15 @@ def test_what_is_not_recorded_has_no_limit_and_says_why(limits: dict[str, Limit]
     assert limits["temperature"].size is None
     assert "hold nothing" in limits["temperature"].why
     assert "coulomb" not in limits
+
+
+@pytest.mark.parametrize(
+    "hidden", [term("actuator_lag", time=4e-3), term("asymmetry", force=2.0), term("quadratic_drag", coefficient=60.0)]
+)
+def test_what_may_be_hidden_in_the_rest_would_not_have_shown(hidden: Term) -> None:
+    track, state = followed(recording(hidden))  # nothing was found: all that is missing is left
+    tried = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False).tried
+    limit = next(each for each in limits_of(track, state, tried, Units()) if each.effect == hidden.effect.id)
+    assert limit.size is not None
+    there = dict(zip((p.name for p in hidden.effect.parameters), hidden.values, strict=True))
+    assert limit.size > 0.9 * there[limit.parameter]

@@ -4,6 +4,9 @@ An effect of the strength A changes the missing force, at first order, by A c, w
 fitted parameters can do themselves is taken out of c; E is the energy of the rest and L that of what the model leaves. With N
 independent values the log likelihood would rise by (N / 2) ln(1 + A^2 E / L). The limit is the A at which that is
 :data:`EVIDENCE`: at one and a half of it most such effects are found, at half of it hardly any.
+
+What the model leaves may hold some of an effect that was not found, because nothing singles it out there. The size at which it
+would take most of that away is added: so much of it may be there already.
 """
 
 from __future__ import annotations
@@ -107,9 +110,21 @@ class _Search:
 
     def needed(self, column: Array) -> float | None:
         """By what a column has to be multiplied; None where the fitted parameters do the same."""
-        beside = column - self.basis @ (self.basis.T @ column)
-        own = float(beside @ beside)
+        own = self.own(column)
         return None if own <= max(_OWN * float(column @ column), _TINY) else math.sqrt(self.energy / own)
+
+    def own(self, column: Array) -> float:
+        """Energy of what the fitted parameters can't do of a column [F^2]."""
+        beside = self.beside(column)
+        return float(beside @ beside)
+
+    def beside(self, column: Array) -> Array:
+        """What the fitted parameters can't do of a column [F]."""
+        return np.asarray(column - self.basis @ (self.basis.T @ column))
+
+    def hidden(self, column: Array) -> float:
+        """How many times a column is in what the model leaves; negative for its opposite."""
+        return -float(self.beside(column) @ self.state.fit.residual) / self.own(column)
 
     def linear(self, column: Column) -> Limit:
         """Of an effect whose force grows in proportion to its amplitude."""
@@ -118,7 +133,8 @@ class _Search:
         if needed is None:
             return _none(effect, _THE_SAME)
         declared = next(p for p in effect.parameters if p.name == column.amplitudes[0])
-        return Limit(effect.id, effect.title, declared.name, needed, False, declared.unit(self.units), "")
+        size = needed + abs(self.hidden(column.parts[0]))
+        return Limit(effect.id, effect.title, declared.name, size, False, declared.unit(self.units), "")
 
     def whole(self, column: Column) -> Limit:
         """Of an effect with another strength: from the size that was tried to the one at which its own column is enough."""
@@ -134,7 +150,8 @@ class _Search:
             if needed is None or not math.isfinite(needed) or value == 0.0:
                 return _none(held.effect, _THE_SAME)
             if 1.0 / _NEAR < needed < _NEAR:
-                size = value / needed if softer else value * needed
+                times = needed + max(self.hidden(change), 0.0)
+                size = value / times if softer else value * times
                 return Limit(held.effect.id, held.effect.title, declared.name, size, softer, declared.unit(self.units), "")
             by = min(max(needed, 1.0 / _STEP), _STEP)
             value = value / by if softer else value * by
@@ -144,7 +161,8 @@ class _Search:
                 grown = model.with_terms((*model.terms, Term(held.effect, values)))
             except ModelError:
                 break
-            needed = self.needed(self.track.residual(grown) - self.state.fit.residual)
+            change = self.track.residual(grown) - self.state.fit.residual
+            needed = self.needed(change)
         return _none(held.effect, "no size was found at which it begins to show")
 
 
