@@ -25,7 +25,6 @@ from ..record import Array, Record
 from ..signals.resolution import noise_of
 from ..signals.stamps import evened
 from ..threads import linear_algebra_in_one
-from .additive.together import middle_of
 from .additive.told import by_component
 from .blocks import one_sided
 from .candidates import FRICTION, Scales, candidates, place_of, scales_of
@@ -33,7 +32,7 @@ from .component import Signature, agreed, signatures
 from .confidence import LITTLE_LEFT, MANY, UNEXPLAINED, confidence_of, is_doubtful, unknown_confidence
 from .excerpt import confirmed, excerpt
 from .fitting import best_track, bounds_of, refit
-from .grow import Growth, by_parts, first_terms, grow, helped, leaves_much, together, with_moves, without_nothings
+from .grow import Growth, by_parts, first_terms, grow, helped, leaves_much, surpassing, together, with_moves, without_nothings
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
 from .limits import limits_of
@@ -182,6 +181,9 @@ def _grown_by_all(tracks: Sequence[Track], start: Model, tell: Callable[[str], N
     complete = by_parts(tracks, proposed, tell) if proposed is not None else None
     if complete is not None:
         return with_moves(complete, tell)
+    better = surpassing(tracks, proposed, begun[1]) if proposed is not None else None
+    if better is not None:
+        return better
     growth = with_moves(grow(tracks, start, tell, begun), tell)
     if growth.beyond > 0.0 or growth.rest > _most_left(growth):
         return by_parts(tracks, proposed or together(tracks, start, tell), tell, growth) or growth
@@ -374,11 +376,7 @@ def _concluded(
             nobody = _unknown(where, likely, growth, scored, unexplained.share, stand_in)
             findings = [
                 nobody,
-                *_beside(
-                    presences(track, begin, end, growth.steps, min(unexplained.share, 1.0), middle_of(searched)),
-                    findings,
-                    growth.steps,
-                ),
+                *_beside(presences(track, end, growth.steps, min(unexplained.share, 1.0)), findings, growth.steps),
             ]
     everything = None if alone is None else unexplained.where
     if missing:

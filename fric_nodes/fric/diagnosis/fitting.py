@@ -31,6 +31,7 @@ __all__ = [
     "unseen",
     "with_amplitudes",
     "with_room",
+    "without_place",
     "without_term",
 ]
 
@@ -93,13 +94,18 @@ def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
     return State(fit, unseen(track, fit, fit.residual), floor, chance)
 
 
-def unseen(track: Track, fit: Fit, residual: Array) -> float:
+def unseen(track: Track, fit: Fit, residual: Array, apart: str = "") -> float:
     """Sum of squares of ``residual`` on blocks left out of the fit in turn [F^2].
+
+    The parameters whose names begin with ``apart`` are not fitted; if it is empty, all are.
 
     It is reckoned at first order, whose fault is what is more than twice what is left where it was fitted. What a bound holds
     stays: else a surplus that comes out at nothing would be credited with what a shortfall would explain.
     """
-    columns = np.concatenate([residual[:, None], fit.jacobian[:, fit.solution.free]], axis=1)
+    used = fit.solution.free
+    if apart:
+        used = used & np.array([not name.startswith(apart) for name in fit.names])
+    columns = np.concatenate([residual[:, None], fit.jacobian[:, used]], axis=1)
     held = np.full(columns.shape[1], restraint(track, fit))
     gram = Gram(columns, blocks_of(track, columns.shape[0]), held)
     return min(gram.left(0, range(1, columns.shape[1])), _INFLATION * float(residual @ residual))
@@ -320,3 +326,11 @@ def best_track(
     if otherwise is not None and stay is not None and best[0] < NOTHING:
         return otherwise, stay
     return best[1], best[2]
+
+
+def without_place(model: Model, place: int) -> Model:
+    """``model`` less its term number ``place``; of several of one effect the others stay."""
+    effect = model.terms[place].effect.id
+    if sum(held.effect.id == effect for held in model.terms) == 1:
+        return without_term(model, effect)
+    return model.with_terms(held for k, held in enumerate(model.terms) if k != place)

@@ -9,13 +9,14 @@ without it, and with each rival in its place, everything is fitted anew. It ends
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..model import Model
-from .additive.together import grown_together, middle_of, without_place
+from .additive.together import grown_together, middle_of
 from .candidates import candidates, scales_of
-from .fitting import NOTHING, State, best_track, refit, without_term
+from .fitting import NOTHING, State, best_track, refit, without_place, without_term
 from .laws import with_best_laws
 from .moves import reconsidered
 from .rivals import BY_CHANCE, OF_EXCESS, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
@@ -23,7 +24,18 @@ from .screen import Screening, Tried, screen
 from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, audit, exchanged, is_nothing, merged, settled
 from .track import Track
 
-__all__ = ["Growth", "by_parts", "first_terms", "grow", "helped", "leaves_much", "together", "with_moves", "without_nothings"]
+__all__ = [
+    "Growth",
+    "by_parts",
+    "first_terms",
+    "grow",
+    "helped",
+    "leaves_much",
+    "surpassing",
+    "together",
+    "with_moves",
+    "without_nothings",
+]
 
 _TO_COMPARE = 2  # terms, after which another beginning is tried
 _OTHER_BEGINNINGS = 2
@@ -39,8 +51,6 @@ _TIED = 0.05  # of the floor: no observer tells two that differ by less
 _MUCH = 0.3  # of what is missing: with more left, another observer may see what it is
 _HARDLY = 0.5  # of what is missing: with more left, it is hardly explained
 _FASTER = 0.02  # of what is missing: with more left to a faster observer, it is looked at what that is
-_HELPS = 0.05  # of what is missing, a term has to take off to be told of beside something unknown
-_MOST_HELPING = 7  # terms then, with those that were there
 _TOGETHER = 3  # effects: of fewer the best is found one after the other
 _TRIED = 0.15  # of the floor: with more left above it, something is fitted in full, whatever it promises at first order
 
@@ -187,13 +197,20 @@ def together(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None
     track = middle_of(tracks)
     begin = refit(track, nominal)
     end = grown_together(track, begin, tell)
-    model, own = end.fit.model, {held.effect.key for held in nominal.terms}
+    steps = _steps_to(track, nominal, end)
+    return Growth(track, begin, end, steps, (), end.excess / max(begin.excess, 1e-300), ended=True)
+
+
+def _steps_to(track: Track, before: Model, end: State) -> tuple[Step, ...]:
+    """What each term of ``end`` brings that ``before`` has not."""
+    model, had = end.fit.model, Counter(held.effect.key for held in before.terms)
     steps = []
     for k, held in enumerate(model.terms):
-        if held.effect.key not in own:
+        had[held.effect.key] -= 1
+        if had[held.effect.key] < 0:
             without = refit(track, without_place(model, k), max_iterations=8)
             steps.append(Step(model.prefixes[k], without.left, end.left, without.floor, without.excess, (), ()))
-    return Growth(track, begin, end, tuple(steps), (), end.excess / max(begin.excess, 1e-300), ended=True)
+    return tuple(steps)
 
 
 def by_parts(
@@ -226,27 +243,49 @@ def by_parts(
             and implausible(other.track.masses, other.end.fit.model) == 0.0
         )
         return replace(other, last=_screened(other.track, other.end)) if complete else None
-    better = bool(other.steps) and _to_a_fast_observer(tracks, other) < _to_a_fast_observer(tracks, growth)
+    left, least = (_to_a_fast_observer(tracks, each) + each.dear for each in (other, growth))
+    better = bool(other.steps) and left < least
     return replace(other, last=_screened(other.track, other.end)) if better else growth
 
 
+def surpassing(tracks: Sequence[Track], proposed: Growth, growth: Growth) -> Growth | None:
+    """The model that was grown together, where it has several effects and leaves less than ``growth`` to a fast observer.
+
+    Its laws have been held against others of their components already. Its parameters have no price: halves of the recordings
+    are asked here, which don't agree about surplus ones.
+
+    Args:
+        tracks: those that both were grown on.
+        proposed: grown together.
+        growth: grown otherwise.
+    """
+    if len(proposed.steps) < _TOGETHER:
+        return None
+    rest = audit(proposed.track, proposed.begin.fit.model, proposed.end.fit.model)
+    unlikely = max(rest, _to_a_fast_observer(tracks, proposed)) + implausible(proposed.track.masses, proposed.end.fit.model)
+    if unlikely >= _to_a_fast_observer(tracks, growth):
+        return None
+    return replace(proposed, rest=rest, last=_screened(proposed.track, proposed.end))
+
+
 def _to_a_fast_observer(tracks: Sequence[Track], growth: Growth) -> float:
-    """Share of what is missing that the fastest observer to which it stands out sees unexplained, and the structure's price.
+    """Share of what is missing that the fastest observer to which it stands out sees unexplained.
 
     A slow one lets a model stick and slip in its own way: there a wrong structure may leave less than the true one.
     """
     for track in sorted(tracks, key=lambda each: -each.bandwidth):
         begin, end = (refit(track, state.fit.model) for state in (growth.begin, growth.end))
         if begin.excess > _FAINTLY * begin.floor:
-            return end.excess / begin.excess + growth.dear
-    return growth.price
+            return end.excess / begin.excess
+    return growth.rest
 
 
 def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:
     """``growth`` and the terms that help beside something unknown; ``growth`` itself where none does.
 
     On a real machine many small effects may add up to what stays. None of them is an explanation, so that the verdict is not
-    theirs; but each has to take its part off blocks that it has not seen, and all of them together off the other half.
+    theirs; but each has to be asked for where flexible functions of all other components are there, and all of them together
+    have to take their part off the other half.
 
     Args:
         tracks: those that ``growth`` was grown on.
@@ -265,12 +304,17 @@ def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None])
         begin, end = (refit(track, state.fit.model) for state in (growth.begin, growth.end))
         rest = audit(track, begin.fit.model, end.fit.model) if growth.steps else 1.0
         start = replace(start, track=track, begin=begin, end=end, rest=rest)
-    raw = _added([track], start, None, tell, most=_MOST_HELPING, least=_HELPS)
-    done = settled(track, raw.begin, raw.end, list(raw.steps))
+    end = grown_together(track, start.end, tell, beside_unknown=True)
+    more = _steps_to(track, start.end.fit.model, end)
+    if not more:
+        return growth
+    done = settled(track, start.begin, end, [*start.steps, *more])
     if len(done.steps) <= len(growth.steps) or done.rest >= start.rest:
         return growth
     gone = (*growth.rejected, *done.gone)
-    return replace(raw, begin=done.begin, end=done.state, steps=done.steps, rest=done.rest, rejected=gone, unhelped=growth)
+    last = _screened(track, done.state)
+    grown = replace(start, end=done.state, begin=done.begin, steps=done.steps, rest=done.rest)
+    return replace(grown, rejected=gone, last=last, unhelped=growth, ended=True)
 
 
 def without_nothings(growth: Growth, end: Model) -> tuple[Growth, Model]:

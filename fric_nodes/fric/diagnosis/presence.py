@@ -7,7 +7,8 @@ the more stays, and the longer it hangs together, the less sure is anything besi
 probability by Bayes' rule. And what nothing explains may show as any law: its share of what is missing counts against each.
 
 What belongs to no law may be mended by the same wrong law in either half. So a law has to be asked for, too, where flexible
-functions of all other components of the machine are there (:mod:`.additive`): what these explain as well is no evidence for it.
+functions of all other components of the machine are there (:mod:`.additive.asked`): what these explain as well is no evidence
+for it.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Model
-from .additive.forms import Form, forms_of
-from .additive.residual import additive, independent_values
+from .additive.asked import Asked
+from .additive.residual import independent_values
 from .candidates import scales_of
 from .fitting import bounds_of, free_names, refit, without_term
 from .settle import Step
@@ -62,18 +63,14 @@ class Presence:
     halves: tuple[Half, Half]
 
 
-def presences(
-    track: Track, begin: Model, end: Model, steps: Sequence[Step], unexplained: float, middle: Track
-) -> dict[str, Presence]:
+def presences(track: Track, end: Model, steps: Sequence[Step], unexplained: float) -> dict[str, Presence]:
     """How sure each term of the grown model ``end`` is there, by the name of the term.
 
     Args:
         track: the recordings learnt from.
-        begin: the refitted nominal model.
         end: the grown model, fitted.
         steps: by which its terms came.
         unexplained: share of what is missing that it leaves, 0 to 1.
-        middle: the recordings as an observer sees them that takes them apart by components.
     """
     left = track.residual(end)
     n = left.shape[0]
@@ -81,7 +78,8 @@ def presences(
     first = (np.arange(n) * 4 // n) % 2 == 0
     with_all = [_on_other(track, end, rows) for rows in (first, ~first)]
     found: dict[str, Presence] = {}
-    at_first = _forms(middle, begin) if steps else []
+    asked = Asked(track, refit(track, end, _ITERATIONS)) if steps else None
+    places = list(end.prefixes)
     for step in steps:
         without = without_term(end, step.term.split("#")[0])
         halves = []
@@ -92,8 +90,7 @@ def presences(
         least = min(each.nats for each in halves)
         sure = min(
             _probability(least) * _among_rivals(step, independent),
-            _asked_for(step, at_first),
-            _asked_for(step, _forms(middle, without)),
+            1.0 if asked is None else _probability(asked.nats(places.index(step.term))),
             _MOST,
         )
         sure *= 1.0 - unexplained
@@ -104,19 +101,6 @@ def presences(
 def _probability(nats: float) -> float:
     """That an effect is there, from the logarithm of its likelihood ratio."""
     return 1.0 / (1.0 + math.exp(-min(max((nats - _EVEN) / _STEEP, -50.0), 50.0)))
-
-
-def _forms(track: Track, model: Model) -> list[Form]:
-    """The laws that explain what ``model`` lacks beside flexible functions of all other components."""
-    state = refit(track, model)
-    return forms_of(state, additive(track, state))
-
-
-def _asked_for(step: Step, forms: Sequence[Form]) -> float:
-    """Probability of the effect of ``step`` among ``forms``."""
-    effect = step.term.split("#")[0]
-    mine = (each for each in forms if each.term.effect.id == effect)
-    return max((_probability(each.nats) * each.probability for each in mine), default=0.0)
 
 
 def _on_other(track: Track, model: Model, rows: NDArray[np.bool_]) -> tuple[Model, float]:

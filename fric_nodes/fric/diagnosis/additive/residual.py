@@ -18,7 +18,7 @@ from ..track import Track, along
 from .components import BY_ID, COMB, COMPONENTS, OTHER_OF, OTHERS, Along, Component, Ranges, comb_cycles
 from .evidence import Grouped, Weighed
 
-__all__ = ["PRESENT", "Additive", "Presence", "additive", "independent_share", "independent_values"]
+__all__ = ["PRESENT", "Additive", "Presence", "additive", "functions_of", "independent_share", "independent_values"]
 
 PRESENT = 0.5
 """Probability from which on something is more likely missing in a component than not."""
@@ -105,16 +105,7 @@ class Additive:
 
 def additive(track: Track, state: State) -> Additive:
     """Take apart what the fitted model of ``state`` lacks on ``track``."""
-    signals = _signals(track, state)
-    ranges = _ranges(track, signals)
-    stride = max(round(_THIN / (track.bandwidth * min(run.sample_time for run in track.runs))), 1)
-    rows = slice(stride // 2, None, stride)
-    groups = {}
-    for component in COMPONENTS:
-        per_run = [component.columns(each, ranges) for each in signals]
-        seen = np.stack([track.seen([part[:, k] for part in per_run]) for k in range(per_run[0].shape[1])], axis=1)[rows]
-        if float(np.max(np.abs(seen))) > 0.0:
-            groups[component.id] = seen
+    groups, rows, ranges = functions_of(track, state)
     laws = _laws(track, state, rows, _strongest_periods(state, rows, groups, ranges))
     places = _places(state, rows, groups, laws)
     for k, place in places.items():
@@ -146,6 +137,21 @@ def additive(track: Track, state: State) -> Additive:
         tuple(found), float(np.sqrt(total)), float(np.sqrt(energy)), floor, grouped.n, dependence, grouped, whole, rows, groups,
         tuple(held), withouts,
     )  # fmt: skip
+
+
+def functions_of(track: Track, state: State) -> tuple[dict[str, Array], slice, Ranges]:
+    """The functions of each component as the observer sees them, by its id, at which rows of the residual, and their ranges."""
+    signals = _signals(track, state)
+    ranges = _ranges(track, signals)
+    stride = max(round(_THIN / (track.bandwidth * min(run.sample_time for run in track.runs))), 1)
+    rows = slice(stride // 2, None, stride)
+    groups = {}
+    for component in COMPONENTS:
+        per_run = [component.columns(each, ranges) for each in signals]
+        seen = np.stack([track.seen([part[:, k] for part in per_run]) for k in range(per_run[0].shape[1])], axis=1)[rows]
+        if float(np.max(np.abs(seen))) > 0.0:
+            groups[component.id] = seen
+    return groups, rows, ranges
 
 
 def _laws(track: Track, state: State, rows: slice, periods: Sequence[float]) -> list[tuple[Column, Array]]:

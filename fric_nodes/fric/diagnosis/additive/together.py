@@ -10,25 +10,28 @@ left is taken apart again, until nothing comes that stays.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from ...model import Model
-from ..fitting import NOTHING, State, refit, without_term
+from ..fitting import NOTHING, State, refit, unseen, without_place
 from ..track import Track
+from .asked import Asked
 from .forms import Form, forms_of
 from .residual import additive
 
-__all__ = ["BANDWIDTH", "grown_together", "middle_of", "without_place"]
+__all__ = ["BANDWIDTH", "grown_together", "middle_of"]
 
 BANDWIDTH = 140.0
 """Of the observer [rad/s]: about 22 Hz, where most axes' friction shows and their structures don't yet ring."""
 
 _WORTH = 5.0  # statistical, nats: odds of about 150 to one, for a law to be fitted in full
-_GAIN = 10.0  # statistical, nats on unseen blocks, for it to stay: beyond what four parameters take off by chance
+_GAIN = 10.0  # statistical, nats, for a law to stay: beyond what four parameters take off by chance
 _PLAUSIBLE = 0.3  # probability among the laws of its component
 _ROUNDS = 4  # numerical: in each at least one term comes
+_ROUNDS_BESIDE = 2  # numerical: the second mends what the first has taken for something else
+_TO_WEIGH = 8  # numerical, iterations from where everything fits
 
 
 def middle_of(tracks: Sequence[Track]) -> Track:
@@ -36,16 +39,18 @@ def middle_of(tracks: Sequence[Track]) -> Track:
     return min(tracks, key=lambda each: abs(math.log(each.bandwidth / BANDWIDTH)))
 
 
-def grown_together(track: Track, begin: State, tell: Callable[[str], None]) -> State:
+def grown_together(track: Track, begin: State, tell: Callable[[str], None], beside_unknown: bool = False) -> State:
     """The model of ``begin`` with the laws that its components ask for, fitted.
 
     Args:
         track: the recordings.
         begin: the fitted model that lacks something.
         tell: told what comes and goes.
+        beside_unknown: where each law has to earn its place, take what flexible functions of the other components explain for
+            explained. Of one that is small beside what no law explains, nothing can be seen otherwise.
     """
     state = begin
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS_BESIDE if beside_unknown else _ROUNDS):
         if state.excess < NOTHING * state.floor:
             break
         taken = additive(track, state)
@@ -55,8 +60,9 @@ def grown_together(track: Track, begin: State, tell: Callable[[str], None]) -> S
             break
         tell("trying together: " + ", ".join(f"{each.term.effect.title} ({each.nats:.0f} nats)" for each in offered))
         terms = (*state.fit.model.terms, *(each.term for each in offered))
-        grown = _pruned(track, refit(track, state.fit.model.with_terms(terms), 20), begin, independent, tell)
-        if _nats(state, grown, independent) < _GAIN:
+        whole = refit(track, state.fit.model.with_terms(terms), 20)
+        grown = _asked_for(track, whole, begin, tell) if beside_unknown else _pruned(track, whole, begin, independent, tell)
+        if _nats(state, grown, independent) < (0.0 if beside_unknown else _GAIN) or _same(state, grown):
             break
         tell(f"leaves {100.0 * grown.excess / max(begin.excess, 1e-300):.0f} % of what was missing")
         state = grown
@@ -85,29 +91,53 @@ def _offered(state: State, forms: list[Form]) -> Iterator[Form]:
             yield form
 
 
+def _same(one: State, other: State) -> bool:
+    return [held.effect.key for held in one.fit.model.terms] == [held.effect.key for held in other.fit.model.terms]
+
+
 def _pruned(track: Track, state: State, begin: State, independent: float, tell: Callable[[str], None]) -> State:
-    """``state`` without the terms that unseen blocks don't ask for."""
-    keys = {held.effect.key for held in begin.fit.model.terms}
+    """``state`` without the terms that unseen blocks don't ask for, the least needed at first order first."""
+    going = True
+    while going:
+        going = False
+        left = {k: _left_without(track, state, k) for k in _new(state, begin)}
+        for place in sorted(left, key=lambda k: left[k]):
+            without = refit(track, without_place(state.fit.model, place), _TO_WEIGH)
+            nats = _nats(without, state, independent)
+            if nats < _GAIN:
+                tell(f"not needed: {state.fit.model.terms[place].effect.title} ({nats:.1f} nats)")
+                state, going = without, True
+                break
+    return state
+
+
+def _asked_for(track: Track, state: State, begin: State, tell: Callable[[str], None]) -> State:
+    """``state`` without the terms that nothing asks for beside flexible functions, the one with the least evidence first."""
     while True:
-        terms = state.fit.model.terms
-        places = [k for k, held in enumerate(terms) if held.effect.key not in keys]
-        if not places:
+        asked = Asked(track, state)
+        nats = {k: asked.nats(k) for k in _new(state, begin)}
+        least = min(nats, key=lambda k: nats[k], default=-1)
+        if least < 0 or nats[least] >= _GAIN:
             return state
-        without = {k: refit(track, without_place(state.fit.model, k)) for k in places}
-        cost = {k: _nats(each, state, independent) for k, each in without.items()}
-        least = min(places, key=lambda k: cost[k])
-        if cost[least] >= _GAIN:
-            return state
-        tell(f"not needed: {terms[least].effect.title} ({cost[least]:.1f} nats)")
-        state = without[least]
+        tell(f"not asked for: {state.fit.model.terms[least].effect.title} ({nats[least]:.1f} nats)")
+        state = refit(track, without_place(state.fit.model, least), _TO_WEIGH)
 
 
-def without_place(model: Model, place: int) -> Model:
-    """``model`` less its term number ``place``; of several of one effect the others stay."""
-    effect = model.terms[place].effect.id
-    if sum(held.effect.id == effect for held in model.terms) == 1:
-        return without_term(model, effect)
-    return model.with_terms(held for k, held in enumerate(model.terms) if k != place)
+def _new(state: State, begin: State) -> list[int]:
+    """Places of the terms that the model of ``begin`` has not, or not so many of."""
+    had = Counter(held.effect.key for held in begin.fit.model.terms)
+    places = []
+    for k, held in enumerate(state.fit.model.terms):
+        had[held.effect.key] -= 1
+        if had[held.effect.key] < 0:
+            places.append(k)
+    return places
+
+
+def _left_without(track: Track, state: State, place: int) -> float:
+    """What the model leaves on unseen blocks without its term number ``place``, everything else fitted anew at first order."""
+    residual = track.residual(without_place(state.fit.model, place))
+    return unseen(track, state.fit, residual, f"{state.fit.model.prefixes[place]}.")
 
 
 def _nats(before: State, after: State, independent: float) -> float:

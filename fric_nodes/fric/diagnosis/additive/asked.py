@@ -1,0 +1,55 @@
+"""Evidence for each term of a fitted model where flexible functions of all components but its own are there.
+
+The missing force without the term, everything else moved at first order, is explained by these functions alone, or by them and
+the term. What they explain as well is no evidence for it, and what they explain of the rest is no noise that it has to stand
+out from.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..fitting import State, without_place
+from ..track import Track
+from .evidence import Grouped
+from .residual import functions_of, independent_share
+
+__all__ = ["Asked"]
+
+_TERM = "term"  # name of a group
+_OWN = 0.02  # statistical, of a term's energy, that all other parameters must leave: else it is them by another name
+_ALIKE = 0.5  # statistical, of a term's energy: that component's function explains most of it
+
+
+class Asked:
+    """What asks for the terms of a fitted model.
+
+    Args:
+        track: the recordings.
+        state: the fitted model.
+    """
+
+    def __init__(self, track: Track, state: State) -> None:
+        self._track, self._state = track, state
+        self._groups, self._rows, _ = functions_of(track, state)
+
+    def nats(self, place: int) -> float:
+        """Evidence for the term number ``place`` of the model, the dependence of the rows counted [nats]."""
+        fit = self._state.fit
+        without = self._track.residual(without_place(fit.model, place))
+        change = (without - fit.residual)[self._rows, None]
+        size = float(np.sqrt(np.mean(change**2)))
+        if size == 0.0:
+            return 0.0
+        prefix = f"{fit.model.prefixes[place]}."
+        others = np.array([not name.startswith(prefix) for name in fit.names])
+        grouped = Grouped(without[self._rows], fit.jacobian[self._rows][:, others], {**self._groups, _TERM: change / size})
+        if grouped.own(_TERM) < _OWN:
+            return 0.0
+        likeness = {name: grouped.likeness(_TERM, name) for name in self._groups}
+        own = max(likeness, key=lambda name: likeness[name])
+        beside = [name for name in self._groups if name != own or likeness[name] < _ALIKE]
+        before = grouped.weighed(beside)
+        start = dict(zip(before.groups, before.sizes, strict=True))
+        after = grouped.weighed([*beside, _TERM], start, float(np.log(before.noise / grouped.size)))
+        return independent_share(grouped.residual(after)) * (after.log_evidence - before.log_evidence)
