@@ -282,6 +282,7 @@ KNOWN: dict[str, Case] = {
         f"fric {name}": _JUDGED
         for name in (
             "prove --cases 300 --seed 110 --out proof",
+            "prove --cases 100 --seed 20261126 --out proof",
             "prove --inject bags/slide --model config/nominal_model.yaml --out proof",
             *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),
             *(
