@@ -281,15 +281,11 @@ KNOWN: dict[str, Case] = {
     **{
         f"fric {name}": _JUDGED
         for name in (
-            "prove --cases 300 --seed 110 --out proof",
-            "prove --cases 100 --seed 20261126 --out proof",
+            *(f"prove --cases {each} --out proof" for each in ("300 --seed 110", "100 --seed 20261126")),
             "prove --inject bags/slide --model config/nominal_model.yaml --out proof",
             *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),
-            *(
-                f"bench {each}"
-                for each in ("batch", "wall-time", "tensor-product-control", "compensation", "circle", "calibration")
-            ),
-            *(f"bench calibration-{each}" for each in ("oscillation", "forced", "static", "two-stage", "tensor-product")),
+            *(f"bench {each}" for each in ("batch", "wall-time", "tensor-product-control", "compensation", "circle")),
+            *(f"bench calibration{it}" for it in ("", "-oscillation", "-forced", "-static", "-two-stage", "-tensor-product")),
         )
     },
     **{
