@@ -104,6 +104,7 @@ def test_workers_that_die_cost_their_recording_only(logs: Path, job: Job, tmp_pa
     assert "died" not in again.table["refusal"].to_pylist()[0]
 
 
+@pytest.mark.long
 def test_kills_lose_nothing_and_change_nothing(good: Path, job: Job, tmp_path: Path) -> None:
     out = tmp_path / "out"
     arguments = ["batch", "identify", str(good), "--terms", "coulomb,viscous", "--workers", "0", "--out"]

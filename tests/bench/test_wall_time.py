@@ -18,6 +18,7 @@ def test_late_messages_are_counted() -> None:
     assert found["period, 99.9 %"] == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.long
 def test_four_processes_keep_a_moving_axis_at_its_rate() -> None:
     found = sent(100.0, 8.0)
     for stamps in found.values():
