@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ __all__ = [
     "NOTHING",
     "Beginning",
     "State",
+    "added",
     "begun",
     "best_track",
     "bounds_of",
@@ -334,3 +336,14 @@ def without_place(model: Model, place: int) -> Model:
     if sum(held.effect.id == effect for held in model.terms) == 1:
         return without_term(model, effect)
     return model.with_terms(held for k, held in enumerate(model.terms) if k != place)
+
+
+def added(before: Model, after: Model) -> list[int]:
+    """Places of the terms of ``after`` that ``before`` has not, or not so many of."""
+    had = Counter(held.effect.key for held in before.terms)
+    places = []
+    for k, held in enumerate(after.terms):
+        had[held.effect.key] -= 1
+        if had[held.effect.key] < 0:
+            places.append(k)
+    return places

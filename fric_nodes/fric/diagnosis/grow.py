@@ -9,14 +9,13 @@ without it, and with each rival in its place, everything is fitted anew. It ends
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..model import Model
 from .additive.together import grown_together, middle_of
 from .candidates import candidates, scales_of
-from .fitting import NOTHING, State, best_track, refit, without_place, without_term
+from .fitting import NOTHING, State, added, best_track, refit, without_place, without_term
 from .laws import with_best_laws
 from .moves import reconsidered
 from .rivals import BY_CHANCE, OF_EXCESS, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
@@ -203,13 +202,11 @@ def together(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None
 
 def _steps_to(track: Track, before: Model, end: State) -> tuple[Step, ...]:
     """What each term of ``end`` brings that ``before`` has not."""
-    model, had = end.fit.model, Counter(held.effect.key for held in before.terms)
+    model = end.fit.model
     steps = []
-    for k, held in enumerate(model.terms):
-        had[held.effect.key] -= 1
-        if had[held.effect.key] < 0:
-            without = refit(track, without_place(model, k), max_iterations=8)
-            steps.append(Step(model.prefixes[k], without.left, end.left, without.floor, without.excess, (), ()))
+    for k in added(before, model):
+        without = refit(track, without_place(model, k), max_iterations=8)
+        steps.append(Step(model.prefixes[k], without.left, end.left, without.floor, without.excess, (), ()))
     return tuple(steps)
 
 

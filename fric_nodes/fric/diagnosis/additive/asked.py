@@ -12,13 +12,11 @@ import numpy as np
 from ..fitting import State, without_place
 from ..track import Track
 from .evidence import Grouped
-from .residual import functions_of, independent_share
+from .residual import ALIKE, OWN, functions_of, independent_share
 
 __all__ = ["Asked"]
 
 _TERM = "term"  # name of a group
-_OWN = 0.02  # statistical, of a term's energy, that all other parameters must leave: else it is them by another name
-_ALIKE = 0.5  # statistical, of a term's energy: that component's function explains most of it
 
 
 class Asked:
@@ -44,11 +42,11 @@ class Asked:
         prefix = f"{fit.model.prefixes[place]}."
         others = np.array([not name.startswith(prefix) for name in fit.names])
         grouped = Grouped(without[self._rows], fit.jacobian[self._rows][:, others], {**self._groups, _TERM: change / size})
-        if grouped.own(_TERM) < _OWN:
+        if grouped.own(_TERM) < OWN:
             return 0.0
         likeness = {name: grouped.likeness(_TERM, name) for name in self._groups}
         own = max(likeness, key=lambda name: likeness[name])
-        beside = [name for name in self._groups if name != own or likeness[name] < _ALIKE]
+        beside = [name for name in self._groups if name != own or likeness[name] < ALIKE]
         before = grouped.weighed(beside)
         start = dict(zip(before.groups, before.sizes, strict=True))
         after = grouped.weighed([*beside, _TERM], start, float(np.log(before.noise / grouped.size)))

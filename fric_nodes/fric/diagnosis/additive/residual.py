@@ -18,10 +18,26 @@ from ..track import Track, along
 from .components import BY_ID, COMB, COMPONENTS, OTHER_OF, OTHERS, Along, Component, Ranges, comb_cycles
 from .evidence import Grouped, Weighed
 
-__all__ = ["PRESENT", "Additive", "Presence", "additive", "functions_of", "independent_share", "independent_values"]
+__all__ = [
+    "ALIKE",
+    "OWN",
+    "PRESENT",
+    "Additive",
+    "Presence",
+    "additive",
+    "functions_of",
+    "independent_share",
+    "independent_values",
+]
 
 PRESENT = 0.5
 """Probability from which on something is more likely missing in a component than not."""
+
+ALIKE = 0.5
+"""Statistical, share of a law's energy that a component's function explains: from this on, the law belongs to the component."""
+
+OWN = 0.02
+"""Statistical, share of a law's energy that all other parameters leave: with less, it is them by another name."""
 
 _REST = 0.01  # of the fast speed, below which the axis may rest
 _THIN = 1.0  # times 1/w, from row to row: what an observer sees is smooth over about two of these
@@ -29,8 +45,6 @@ _ROUNDS = 15  # iterations from the sizes that hold with all components
 _PRIOR = 0.1  # probability, before the recording is seen, that something is missing in a component
 _SEEN = 1.5  # times the bandwidth: forces that come faster are hardly seen
 _SLOWLY = 0.25  # quantile of the speed
-_ALIKE = 0.5  # of a law's energy: its component's function explains most of it
-_OWN = 0.02  # of a law's energy, that the parameters of the fit must leave: else it is one of them by another name
 _STRONGEST = 3  # periods that are tried
 
 
@@ -179,11 +193,11 @@ def _places(state: State, rows: slice, groups: dict[str, Array], laws: Sequence[
     grouped = Grouped(state.fit.residual[rows], state.fit.jacobian[rows], {**groups, **named})
     places = {}
     for k, (column, _) in enumerate(laws):
-        if grouped.own(f"law {k}") < _OWN:
+        if grouped.own(f"law {k}") < OWN:
             continue  # the fitted parameters do the same
         likeness = {each: grouped.likeness(f"law {k}", each) for each in groups}
         best = max(likeness, key=lambda each: likeness[each])
-        places[k] = best if likeness[best] >= _ALIKE else OTHER_OF[place_of(column.term.effect)]
+        places[k] = best if likeness[best] >= ALIKE else OTHER_OF[place_of(column.term.effect)]
     return places
 
 

@@ -10,12 +10,11 @@ left is taken apart again, until nothing comes that stays.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from ..fitting import NOTHING, State, refit, unseen, without_place
+from ..fitting import NOTHING, State, added, refit, unseen, without_place
 from ..track import Track
 from .asked import Asked
 from .forms import Form, forms_of
@@ -100,7 +99,7 @@ def _pruned(track: Track, state: State, begin: State, independent: float, tell: 
     going = True
     while going:
         going = False
-        left = {k: _left_without(track, state, k) for k in _new(state, begin)}
+        left = {k: _left_without(track, state, k) for k in added(begin.fit.model, state.fit.model)}
         for place in sorted(left, key=lambda k: left[k]):
             without = refit(track, without_place(state.fit.model, place), _TO_WEIGH)
             nats = _nats(without, state, independent)
@@ -115,23 +114,12 @@ def _asked_for(track: Track, state: State, begin: State, tell: Callable[[str], N
     """``state`` without the terms that nothing asks for beside flexible functions, the one with the least evidence first."""
     while True:
         asked = Asked(track, state)
-        nats = {k: asked.nats(k) for k in _new(state, begin)}
+        nats = {k: asked.nats(k) for k in added(begin.fit.model, state.fit.model)}
         least = min(nats, key=lambda k: nats[k], default=-1)
         if least < 0 or nats[least] >= _GAIN:
             return state
         tell(f"not asked for: {state.fit.model.terms[least].effect.title} ({nats[least]:.1f} nats)")
         state = refit(track, without_place(state.fit.model, least), _TO_WEIGH)
-
-
-def _new(state: State, begin: State) -> list[int]:
-    """Places of the terms that the model of ``begin`` has not, or not so many of."""
-    had = Counter(held.effect.key for held in begin.fit.model.terms)
-    places = []
-    for k, held in enumerate(state.fit.model.terms):
-        had[held.effect.key] -= 1
-        if had[held.effect.key] < 0:
-            places.append(k)
-    return places
 
 
 def _left_without(track: Track, state: State, place: int) -> float:
