@@ -12,8 +12,8 @@ is the mean force that the link gives for the deflections e_0 and e_1 that it le
     L = link(e_0, e_1(L), h).
 
 The more it pulls, the less the motor gets ahead, so e_1 falls with L, and L - link(...) rises with a slope of 1 at least: there
-is one root, and it lies between any trial and that trial less its excess. Regula falsi finds it in two more trials where
-everything is linear. As one force leads both bodies, no momentum is lost but to rounding, and as its work on both is
+is one root, and it lies between any trial and that trial less its excess. As e_1 is nearly a straight line over L, the link is
+solved along that line, and the line is drawn anew through what the bodies did: two trials where no friction lets go or holds. As one force leads both bodies, no momentum is lost but to rounding, and as its work on both is
 L (e_1 - e_0), the energy of an undamped link is kept as well as the root is found, whatever the step and whatever sticks or
 stops.
 
@@ -102,31 +102,71 @@ def elastic_trial(
 
 
 @kernel
+def linked(p: Any, e: float, at: float, slope: float, near: float, enough: float, h: float) -> float:
+    """The link's mean force [F] if it leads the deflection from ``e`` to ``at + slope force`` [x]; ``slope`` <= 0 [x/F].
+
+    The search begins ``near`` it [F]; the result may be wrong by ``enough`` [F]. It lies between no force and that of the
+    deflection which no force leads to, and between any trial and that trial less its excess.
+    """
+    free = link(e, at, h, p)
+    low, high = min(free, 0.0), max(free, 0.0)
+    a = min(max(near, low), high)
+    excess_a = a - link(e, at + slope * a, h, p)
+    if not abs(excess_a) > enough:
+        return a
+    b = min(max(a - excess_a, low), high)
+    excess_b = b - link(e, at + slope * b, h, p)
+    halve = False
+    for _ in range(100):
+        width = abs(b - a)
+        if not abs(excess_b) > enough or width <= enough:
+            break  # also at once where it is no number
+        f = 0.5 * (a + b) if halve else b - excess_b * (b - a) / (excess_b - excess_a)
+        excess = f - link(e, at + slope * f, h, p)
+        if excess * excess_b < 0.0:
+            a, excess_a = b, excess_b
+        else:
+            excess_a *= 0.5  # Illinois: the end that stays is made to move
+        b, excess_b = f, excess
+        # At the other end of the play the force is many times larger: a straight line from there hardly moves.
+        halve = abs(b - a) > 0.5 * width and not halve
+    return b
+
+
+@kernel
 def elastic_step(
     p: Any, motor: Any, m_l: float, x: Any, x_next: Any, s: Inner, u: float, h: float, around: Surroundings
 ) -> float:
-    """The step with an elastic transmission; mean friction force of the contact [F]."""
+    """The step with an elastic transmission; mean friction force of the contact [F].
+
+    However stiff the link and however bent, the deflection that the bodies end with is nearly a straight line over the force:
+    both of them are led once or twice, and between that the link alone is solved along the line.
+    """
     e = x[2] - x[0]
-    f = link(e, e + h * (x[3] - x[1]), h, p)
-    a = b = f
-    excess_a = excess_b = enough = friction = 0.0
+    at = e + h * (x[3] - x[1])
+    slope = steepest = -0.5 * h * h * (1.0 / motor[0] + 1.0 / m_l)
+    enough = 1e-9 * abs(link(e, at, h, p))
+    f = linked(p, e, at, slope, link(e, e, h, p), 0.01 * enough, h)
+    low, high = -math.inf, math.inf
+    before = end_before = friction = 0.0
     for trial in range(60):
         excess, friction = elastic_trial(p, motor, m_l, x, x_next, s, u, f, h, around)
-        if trial == 0:
-            enough = 1e-9 * abs(excess)
-        if not abs(excess) > enough or (trial > 0 and abs(f - b) <= 4e-16 * abs(f)):
+        if not abs(excess) > enough:
             break  # also at once where it is no number
-        if trial == 1 or excess * excess_b < 0.0:
-            a, excess_a = b, excess_b
-        elif abs(excess) > 0.5 * abs(excess_b):
-            excess_a *= 0.5  # Illinois: the end that stays is made to move
-        b, excess_b = f, excess
-        if trial == 0:
-            f -= excess
-        elif excess != excess_a:
-            f -= excess * (f - a) / (excess - excess_a)
+        if excess > 0.0:
+            low, high = max(low, f - excess), min(high, f)
         else:
-            f = 0.5 * (f + a)
+            low, high = max(low, f), min(high, f - excess)
+        end = x_next[2] - x_next[0]
+        if trial > 0 and f != before:
+            # Friction may hold a body, but doesn't make it lighter.
+            slope = min(max((end - end_before) / (f - before), steepest), 0.0)
+        before, end_before = f, end
+        f = linked(p, e, end - slope * f, slope, f, 0.01 * enough, h)
+        if not low <= f <= high or trial > 8:
+            f = 0.5 * (low + high)  # friction that lets go or holds bends the line
+        if abs(f - before) <= 1e-10 * abs(f):
+            break  # what is left of the excess is a rounding of the positions, times the stiffness
     return friction
 
 
@@ -261,6 +301,6 @@ def driven_step(
 TRANSMISSION_FUNCTIONS = (
     own,
     *CONTACT_FUNCTIONS,
-    *(motor_step, load_step, elastic_trial, elastic_step, as_one, until_contact, rigid_step, driven_step),
+    *(motor_step, load_step, elastic_trial, linked, elastic_step, as_one, until_contact, rigid_step, driven_step),
 )
 """What a driven plant lists among its functions, before its ``step``; its ``own`` is among them."""
