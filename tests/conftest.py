@@ -13,6 +13,11 @@ from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# How long it takes to draw an example says more about what else the machine does than about what is tested.
+settings.register_profile("fric", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("fric")
 
 _BEYOND = 600.0  # [s] after a test's own time limit
 _STDERR = pytest.StashKey[TextIO]()

@@ -140,6 +140,7 @@ def test_the_cylinder_gives_the_force_that_is_wanted() -> None:
     assert abs(body.position) < 0.05
 
 
+@pytest.mark.long
 def test_a_circle_shows_its_quadrants_and_a_model_flattens_them() -> None:
     held = rounds(3, 1.0, ("pid + velocity", "pid + pre-sliding model"))
     before, after = (peak(error) for _, error in held.values())

@@ -168,6 +168,7 @@ def test_what_a_recording_cannot_tell_is_said_before_the_fit(csv: Path, tmp_path
     assert escape(coupled[0]["message"]) in (tmp_path / "found" / "report.html").read_text()
 
 
+@pytest.mark.long
 def test_a_design_from_a_model_alone_writes_what_the_excitation_node_takes(tmp_path: Path, fric: Command) -> None:
     model = tmp_path / "model.yaml"
     model.write_text(

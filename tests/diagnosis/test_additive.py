@@ -99,6 +99,7 @@ def test_where_nothing_is_missing_nothing_comes() -> None:
     assert _grown({}) == {}
 
 
+@pytest.mark.long
 def test_what_is_missing_shows_in_its_component() -> None:
     tracks, start = started(NOMINAL, [_recording({"drift": 0.02})])
     found = by_component(tracks, start)

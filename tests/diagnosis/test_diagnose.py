@@ -133,6 +133,7 @@ def test_what_a_slow_observer_does_not_see_is_found_by_a_faster_one() -> None:
     assert found.unexplained.share < 0.02
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effect", "seed", "name", "true"),
     [

@@ -73,6 +73,7 @@ def test_a_mode_that_holds_most_of_the_mass_is_the_best_candidate() -> None:
     assert screened.tried[0].gain > 0.2 * state.excess
 
 
+@pytest.mark.long
 def test_beside_a_transmission_a_period_is_told_along_the_motion() -> None:
     """Where the load's motion isn't measured, the motor's tells well enough which of many periods to follow up."""
     motor, load, stiffness, damping, viscous, period, step = 0.9, 1.1, 8e4, 20.0, 40.0, 0.021, 1e-3

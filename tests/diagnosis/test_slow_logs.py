@@ -48,6 +48,7 @@ def test_white_noise_leaves_nothing_unsure_between_samples_and_a_jump_does_where
     assert not np.any(runs_of(_record(jump, "following"))[0].between)
 
 
+@pytest.mark.long
 def test_a_force_held_from_its_stamp_comes_half_a_sample_late_where_nobody_says_so() -> None:
     case = draw(4, "nothing")
     record = case.train[0]
@@ -93,6 +94,7 @@ def test_stamps_that_jitter_where_the_motion_does_not_are_taken_as_even() -> Non
     assert not diagnose(case.train, validation, case.nominal).mismatch
 
 
+@pytest.mark.long
 def test_uneven_stamps_of_an_uneven_log_are_left_as_they_are() -> None:
     case = draw(4, "nothing")
     apart = np.cumsum(np.random.default_rng(5).integers(2, 5, case.train[0].n_samples))

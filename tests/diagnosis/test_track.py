@@ -38,7 +38,7 @@ def model(viscous: float = VISCOUS, **extra: float) -> Model:
     return build_model("rigid", {"mass": MASS}, [*terms, term("bias", **extra)] if extra else terms)
 
 
-@pytest.mark.parametrize("bandwidth", [45.0, 140.0, 400.0])
+@pytest.mark.parametrize("bandwidth", [pytest.param(45.0, marks=pytest.mark.long), 140.0, 400.0])
 def test_a_constant_force_is_lacking_in_full_however_much_friction_the_model_has(bandwidth: float) -> None:
     track = Track.of([recorded()], bandwidth, model())
     lacking = track.residual(model())

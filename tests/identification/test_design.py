@@ -104,6 +104,7 @@ def test_the_limits_hold_on_an_axis_simulated_by_other_means(slow: Proposal) -> 
     assert motion.time[-1] <= LIMITS.duration + 1e-9
 
 
+@pytest.mark.long
 def test_the_promise_is_kept(small: Proposal) -> None:
     """Fits to recordings with noise of their own scatter as was promised."""
     from fric.identification import METHODS

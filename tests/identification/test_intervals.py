@@ -48,6 +48,7 @@ def test_of_static_maps(name: str) -> None:
     assert 0.4 < size < 1.6
 
 
+@pytest.mark.long
 def test_of_forced_oscillations_that_stop_at_their_turns() -> None:
     calibration, refused = count(forced, range(300, 312), 1)
     assert refused <= 2  # those that rest for too long
@@ -56,6 +57,7 @@ def test_of_forced_oscillations_that_stop_at_their_turns() -> None:
     assert 0.6 < float(np.sqrt(np.mean(score**2))) < 1.5
 
 
+@pytest.mark.long
 def test_of_the_two_stage_method_in_fast_turns() -> None:
     share, size = pooled(partial(trial, 0.04), 8)
     assert share >= 0.75

@@ -136,6 +136,7 @@ def test_a_clock_that_jumps_costs_a_block_and_no_more(mover: Callable[..., Any])
     assert found.samples_used > 18_000
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("forgetting_time", [60.0, 5.0])
 def test_standard_errors_are_the_spread_of_the_estimates_under_coloured_noise(
     mover: Callable[..., Any], forgetting_time: float

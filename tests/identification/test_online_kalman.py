@@ -44,7 +44,7 @@ def plain(mover: Callable[..., Any]) -> Record:
     return mover(duration=12.0, asymmetry=0.0).record(noise=0.3, resolution=1e-6)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [KINDS[0], *(pytest.param(each, marks=pytest.mark.long) for each in KINDS[1:])])
 def test_it_finds_an_axis_that_another_integrator_moved(kind: str, plain: Record) -> None:
     found = begun(kind, plain).estimate()
     truth = dict(zip(NAMES, (2.0, 8.0, 15.0, 0.8), strict=True))
@@ -57,6 +57,7 @@ def test_it_finds_an_axis_that_another_integrator_moved(kind: str, plain: Record
     assert found.status.startswith("every parameter is determined")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_bristles_are_found_from_a_start_half_as_stiff_again(kind: str, mover: Callable[..., Any]) -> None:
     run = mover(duration=12.0, travel=0.03, top=4.0, asymmetry=0.0, stiffness=2e5, damping=400.0)

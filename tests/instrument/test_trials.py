@@ -22,6 +22,7 @@ def test_the_fault_is_found(fault: Fault) -> None:
     assert any(finding.verdict in fault.verdicts for finding in findings), findings
 
 
+@pytest.mark.long
 def test_clean_recordings_raise_no_alarm() -> None:
     wrong, _ = false_alarms(range(30_000, 30_012))
     assert wrong == []
@@ -38,6 +39,7 @@ def test_a_loop_at_its_margin_vibrates_faster_than_its_samples_show() -> None:
     assert verdicts == ["ok", "fault"]
 
 
+@pytest.mark.long
 def test_ordinary_recordings_have_no_fault() -> None:
     said = ordinary_alarms(range(30_000, 30_042))  # every kind three times
     assert said.faults == ()

@@ -256,6 +256,7 @@ def test_it_follows_a_step_of_friction_in_a_running_graph(graph: Any, tmp_path: 
     assert level[since > 3.0] == pytest.approx(9.0, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("estimator", ["ekf", "ukf"])
 def test_from_a_recording_by_kalman_filter(graph: Any, tmp_path: Path, estimator: str) -> None:
     listener = Listener(graph)

@@ -213,7 +213,7 @@ def test_what_publishers_offer_is_in_the_bag_and_played_again(graph: Any, tmp_pa
     assert played["/joint_states"] == (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE)
 
 
-@pytest.mark.parametrize("lock_step", [False, True])
+@pytest.mark.parametrize("lock_step", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_the_recorder_may_be_started_last(graph: Any, tmp_path: Path, lock_step: bool) -> None:
     """The excitation waits for it, so that the motion is recorded from its start on."""
     common = {"lock_step": str(lock_step).lower(), "period": 0.002}

@@ -55,6 +55,7 @@ def test_a_body_on_hardly_any_asperities_moves_as_a_general_solver_has_it() -> N
     np.testing.assert_allclose(position, found.y[0], atol=2e-3 * 0.01)
 
 
+@pytest.mark.long
 def test_a_slipping_piston_obeys_newton_under_friction_that_is_more_while_it_speeds_up() -> None:
     step = 1e-4
     position, force = slips(0.02, (0.022,), step)

@@ -17,15 +17,22 @@ from fric.verification.verification import Evidence, Verification
 _LONG = {
     "amthor",
     "asperity-dwell",
+    "asperity-dynamics",
+    "asperity-velocity",
     "calibration",
     "compensation-guideway",
     "compensation-robust",
+    "excitations",
     "free-oscillation",
+    "lugre-reference",
     "online",
     "passivity",
+    "pneumatic",
+    "quarter-car",
     "static-maps",
     "steady-curves",
     "stick-slip",
+    "tensor-product",
 }
 
 
