@@ -229,7 +229,7 @@ KNOWN: dict[str, Case] = {
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml --out diagnosis": _long(),
     "fric diagnose bags/slide --validate bags/contour --model config/nominal_model.yaml": _long(),
     "fric diagnose bags/slide --blocks 8 --model config/nominal_model.yaml --out diagnosis": _long(),
-    **dict.fromkeys(("fric --version", "fric env", "fric doctor", "fric doctor bags/slide"), Case()),
+    **{f"fric {it}": Case() for it in ("--version", "env", "doctor", "doctor bags/slide", "identify bags/slide --pieces 20")},
     "fric compare bags/simulated bags/slide --out comparison": Case((_simulated,)),
     "fric model show found/model.yaml": Case((_found,)),
     "fric simulate found/model.yaml --force bags/slide --out bags/simulated": Case((_found,)),
@@ -282,7 +282,7 @@ KNOWN: dict[str, Case] = {
         f"fric {name}": _JUDGED
         for name in (
             *(f"prove --cases {each} --out proof" for each in ("300 --seed 110", "100 --seed 20261126")),
-            "prove --inject bags/slide --model config/nominal_model.yaml --out proof",
+            *("prove --inject bags/slide --model config/nominal_model.yaml --out proof", "bench long-recordings"),
             *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),
             *(f"bench {each}" for each in ("batch", "wall-time", "tensor-product-control", "compensation", "circle")),
             *(f"bench calibration{it}" for it in ("", "-oscillation", "-forced", "-static", "-two-stage", "-tensor-product")),

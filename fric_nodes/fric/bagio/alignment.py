@@ -12,7 +12,7 @@ from ..record import Array
 from .checks import Stamps, gap_length_ns
 from .series import Series
 
-__all__ = ["clocks", "held", "hermite", "stamp_of"]
+__all__ = ["clocks", "held", "hermite", "reference_of", "stamp_of"]
 
 
 def stamp_of(of: Series) -> Stamps:
@@ -74,3 +74,12 @@ def hermite(at: Stamps, times: Stamps, position: Array, velocity: Array) -> Arra
     curve = p0 + s * (v0 + s * (3 * d - 2 * v0 - v1 + s * (v0 + v1 - 2 * d)))
     held = np.where(at < times[0], position[0], np.where(at >= times[left + 1], p1, p0))
     return np.where(inside, curve, held)
+
+
+def reference_of(of: Series) -> Series:
+    """A reference with the field ``position``, and ``velocity`` if it has one; also that of a trajectory controller."""
+    for point in ("reference.", "desired."):
+        if f"{point}position" in of.fields:
+            names = [name for name in ("position", "velocity") if f"{point}{name}" in of.fields]
+            return of._replace(fields={name: of.fields[point + name] for name in names})
+    return of

@@ -8,7 +8,6 @@ are compared by time of reception, on both sides, because the clock of the stamp
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -16,8 +15,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..record import Array, Mask, Record, Units
-from .alignment import clocks, hermite, stamp_of
+from ..record import Array, Record, Units
+from .alignment import clocks, hermite, reference_of, stamp_of
 from .checks import Samples, check_samples, pick_topic
 from .effort import EffortFrom, EffortSearch, command_topics
 from .errors import BagError, DamagedError
@@ -26,8 +25,19 @@ from .series import Messages, Series, collect, joints_in, number_series, series
 from .source import Source
 from .topics import Raw, Topic, Topics
 from .types import ARRAYS, FLOAT32, FLOAT64, JOINT_TYPES, REFERENCE, STAMPED_FORCE, TRAJECTORY_STATE
+from .window import Window, stored_invalid, stored_notes
 
-__all__ = ["BagInfo", "EffortFrom", "TimeFrom", "Topics", "bag_info", "iterate_raw", "joint_list", "read_record"]
+__all__ = [
+    "BagInfo",
+    "EffortFrom",
+    "RecordReading",
+    "TimeFrom",
+    "Topics",
+    "bag_info",
+    "iterate_raw",
+    "joint_list",
+    "read_record",
+]
 
 TimeFrom = Literal["stamp", "log"]
 _HOLDS = ("following", "preceding", "linear", "unknown")
@@ -94,6 +104,7 @@ def read_record(
     end: float | None = None,
     effort: EffortFrom = "auto",
     units: Units | None = None,
+    window: tuple[float, float] | None = None,
 ) -> Record:
     """Read one joint of a recording.
 
@@ -107,6 +118,7 @@ def read_record(
         end: last time to keep [s] from the first sample; None for the last sample.
         effort: ``joint_states``, ``command``, or ``auto`` for the joint states where they have it and the command otherwise.
         units: units of position and force; None for those stored with the bag, or else m and N.
+        window: read only what was received between these times [s] from the first message; the rest stays on the disk.
 
     Returns:
         Record with one sample per joint state.
@@ -115,22 +127,36 @@ def read_record(
         BagError: anything that makes the recording unusable, with its remedy.
     """
     names = topics or Topics()
+
+    def found(source: Source) -> Record:
+        part = None if window is None else Window.of(source, *window)
+        return RecordReading(source, names, time, effort, repair, part).record(joint, units)
+
     try:
         with Source(path) as source:
-            record = _Reading(source, names, time, effort, repair).record(joint, units)
+            record = found(source)
     except DamagedError as damage:
         # Something inside does not read: take what is whole, block by block. What is lost then shows as a gap.
         with Source(path, recover=True) as source:
             source.notes.insert(0, f"the bag {damage.problem}; read record by record")
-            record = _Reading(source, names, time, effort, repair).record(joint, units)
+            record = found(source)
     return record if start is None and end is None else record.between(start, end)
 
 
-class _Reading:
-    """One pass over one bag."""
+class RecordReading:
+    """One pass over one bag or a window of it.
 
-    def __init__(self, source: Source, topics: Topics, time: TimeFrom, effort: EffortFrom, repair: bool) -> None:
+    Attributes:
+        n_states: joint states that it has read.
+    """
+
+    def __init__(
+        self, source: Source, topics: Topics, time: TimeFrom, effort: EffortFrom, repair: bool, window: Window | None = None
+    ) -> None:
         self.source = source
+        source.window = None if window is None else window.around
+        self.window = window
+        self.n_states = 0
         self.where = source.path
         self.topics = topics
         self.effort_from = effort
@@ -141,6 +167,7 @@ class _Reading:
         self.candidates: dict[str, Messages] = {}
 
     def record(self, joint: str | None, units: Units | None) -> Record:
+        """The record, see :func:`read_record`."""
         custom = self.source.custom
         raw = self._collect()
         states = series(self.where, raw["joint_states"], joint, custom.get("fric.joint"))
@@ -159,8 +186,7 @@ class _Reading:
         self._optional(states, raw, signals)
         hold = "following" if effort.commanded else effort.hold or custom.get("fric.effort_hold", "unknown")
         samples = Samples(time_ns, signals, effort.valid, [], hold if hold in _HOLDS else "unknown")
-        own_invalid = _stored_invalid(custom, samples.time_ns.size)
-        samples.valid &= own_invalid
+        self._stored_invalid(samples, raw["joint_states"].topic)
         if effort.commanded:
             self._after_first_command(samples)
         check_samples(self.where, samples, repair=self.repair)
@@ -177,7 +203,7 @@ class _Reading:
             units=self._units(units),
             source=str(self.where),
             effort_hold=samples.hold,
-            notes=(*_stored_notes(custom), *self.notes, *samples.notes),
+            notes=(*stored_notes(custom), *self.notes, *samples.notes),
         )
 
     def _collect(self) -> dict[str, Messages]:
@@ -205,6 +231,12 @@ class _Reading:
                 self.refused[role] = error
         others = [] if "force_command" in roles or self.topics.effort else command_topics(have)
         found = collect(self.source, [*roles.values(), *others])
+        if self.window is not None:
+            states = roles["joint_states"].name
+            found[states] = self.window.inside(found[states])
+            if not found[states].data:
+                raise BagError(self.where, f"no message of {states} in this part of it", "choose another part")
+        self.n_states = len(found[roles["joint_states"].name].data)
         self.candidates = {topic.name: found[topic.name] for topic in others if found[topic.name].data}
         needed |= {"joint_states"}
         return {role: found[topic.name] for role, topic in roles.items() if found[topic.name].data or role in needed}
@@ -244,6 +276,19 @@ class _Reading:
             raise BagError(self.where, problem, "choose another joint with --joint NAME, or record its position")
         return position
 
+    def _stored_invalid(self, samples: Samples, topic: Topic) -> None:
+        """Leave out what the writer of the bag has left out."""
+        custom, n_samples, window = self.source.custom, samples.time_ns.size, self.window
+        if window is None or "fric.invalid" not in custom:
+            valid = stored_invalid(custom, n_samples)
+        else:
+            before = window.counted(self.source, topic)
+            valid = None if before is None else stored_invalid(custom, n_samples, before, topic.n_messages)
+            if valid is None:
+                self.notes.append("which samples the writer of the recording left out is not known: their numbers are not")
+        if valid is not None:
+            samples.valid &= valid
+
     def _after_first_command(self, samples: Samples) -> None:
         """Leave out the joint states before the first command, whose effort is not known."""
         known = ~np.isnan(samples.signals["effort"])
@@ -267,7 +312,7 @@ class _Reading:
             if role in {"joint_states", "force_command", "effort"}:
                 continue
             if role == "reference":
-                other = _reference(series(self.where, messages, states.joint))
+                other = reference_of(series(self.where, messages, states.joint))
             else:
                 selection = split_topic(getattr(self.topics, role, ""))[1]
                 other = number_series(self.where, messages, states.joint, selection, role=role, certain=True)
@@ -348,33 +393,3 @@ def _joint_list(source: Source, topics: Topics) -> list[str]:
 def _namespace(states: Topic, topics: Topics) -> str:
     """What stands before the usual name of the joint states in the name they were found under."""
     return states.name.removesuffix(topics.joint_states) if states.name.endswith(topics.joint_states) else ""
-
-
-def _reference(of: Series) -> Series:
-    """A reference with the field ``position``, and ``velocity`` if it has one; also that of a trajectory controller."""
-    for point in ("reference.", "desired."):
-        if f"{point}position" in of.fields:
-            names = [name for name in ("position", "velocity") if f"{point}{name}" in of.fields]
-            return of._replace(fields={name: of.fields[point + name] for name in names})
-    return of
-
-
-def _stored_invalid(custom: dict[str, str], n_samples: int) -> Mask:
-    """Which samples the writer of the bag left usable; all, when it does not say or the number of samples differs."""
-    valid = np.ones(n_samples, dtype=np.bool_)
-    try:
-        stored = json.loads(custom.get("fric.invalid", "{}"))
-        if stored and stored["samples"] == n_samples:
-            for first, last in stored["ranges"]:
-                valid[first : last + 1] = False
-    except (ValueError, KeyError, TypeError):
-        pass  # written by somebody else: only an offer
-    return valid
-
-
-def _stored_notes(custom: dict[str, str]) -> tuple[str, ...]:
-    try:
-        stored = json.loads(custom.get("fric.notes", "[]"))
-    except ValueError:
-        return ()
-    return tuple(str(note) for note in stored) if isinstance(stored, list) else ()

@@ -66,7 +66,7 @@ class Messages(NamedTuple):
 
 
 def collect(source: Source, topics: Collection[Topic]) -> dict[str, Messages]:
-    """Raw messages of topics, by name, in one pass over the bag, each in the order of reception."""
+    """Raw messages of topics, by name, in one pass over the bag or its window, each in the order of reception."""
     times: dict[str, list[int]] = {topic.name: [] for topic in topics}
     data: dict[str, list[bytes]] = {topic.name: [] for topic in topics}
     types = {topic.name: topic.msgtype for topic in topics}
@@ -78,7 +78,7 @@ def collect(source: Source, topics: Collection[Topic]) -> dict[str, Messages]:
     for topic in topics:
         log_ns = np.array(times[topic.name], dtype=np.int64)
         messages = data[topic.name]
-        if len(messages) != topic.n_messages and not source.recovered:
+        if len(messages) != topic.n_messages and not source.recovered and source.window is None:
             problem = f"is damaged ({len(messages)} of {topic.n_messages} messages of {topic.name} are where its index says)"
             raise DamagedError(source.path, problem, "record again, or restore it from a copy")
         if np.any(np.diff(log_ns) < 0):  # several recorder threads, or files out of order

@@ -62,6 +62,7 @@ class Source:
         storage: ``mcap``, ``sqlite3`` or ``ros1``.
         custom: the key and value pairs that the recorder stored with the bag.
         notes: what was wrong with the files and how they were read all the same.
+        window: times of reception [ns] from which, and before which, :meth:`messages` gives; None: all.
     """
 
     def __init__(self, path: str | Path, *, recover: bool = False) -> None:
@@ -79,6 +80,7 @@ class Source:
         self.custom: dict[str, str] = {}
         self.storage = ""
         self.topics: tuple[Topic, ...] = ()
+        self.window: tuple[int, int] | None = None
         self._stack = ExitStack()
         self._reader: Reader | None = None
         self._scans: list[McapScan | SqliteScan | Ros1Scan] = []
@@ -111,23 +113,35 @@ class Source:
         """Time of reception of the first message [ns]; None when there is none."""
         if self._reader is not None:
             return int(self._reader.start_time) if self._reader.message_count else None
-        return next((message.log_time_ns for message in self.messages()), None)
+        return next((message.log_time_ns for scan in self._scans for message in scan.messages()), None)
+
+    @property
+    def end_ns(self) -> int | None:
+        """Time of reception of the last message [ns], for which a scan passes through the file; None when there is none."""
+        if self._reader is not None:
+            return int(self._reader.end_time) - 1 if self._reader.message_count else None
+        return max((message.log_time_ns for scan in self._scans for message in scan.messages()), default=None)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]:
-        """Messages in the order of reception; of all topics when ``topics`` is None.
+        """Messages of the window in the order of reception; of all topics when ``topics`` is None.
+
+        A window is found by the index of the storage. A scan has none: it passes through the whole file.
 
         Raises:
             DamagedError: the storage turns out to be damaged on the way.
         """
+        first, stop = self.window or (None, None)
         if self._reader is None:
             for scan in self._scans:
-                yield from scan.messages(topics)
+                for message in scan.messages(topics):
+                    if first is None or stop is None or first <= message.log_time_ns < stop:
+                        yield message
             return
         chosen = [x for x in self._reader.connections if topics is None or x.topic in topics]
         if not chosen:
             return
         try:
-            for connection, log_time, data in self._reader.messages(chosen):
+            for connection, log_time, data in self._reader.messages(chosen, first, stop):
                 if not 0 <= log_time < 1 << 63:
                     raise ValueError(f"a time of reception of {log_time} ns")
                 yield Raw(connection.topic, connection.msgtype, log_time, data)

@@ -19,7 +19,8 @@ class Benchmark:
         title: what is measured, in a few words.
         run: gives its figures.
         long: takes minutes: run only when named, or with all the others when all are asked for.
-        sized: gives its figures for so many recordings; None where their number is fixed.
+        sized: gives its figures for a size that the user gives; None where it is fixed.
+        size: what ``sized`` counts, the name of the option: ``recordings`` or ``hours``.
     """
 
     id: str
@@ -27,3 +28,4 @@ class Benchmark:
     run: Callable[[], list[Figure]]
     long: bool = False
     sized: Callable[[int], list[Figure]] | None = None
+    size: str = "recordings"

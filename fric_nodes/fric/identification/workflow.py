@@ -56,6 +56,7 @@ def identified(
     options: Options | None = None,
     progress: Progress = silent,
     experiments: bool = True,
+    foresight: bool = True,
 ) -> Fitted:
     """Fit ``structure`` to recordings.
 
@@ -67,6 +68,7 @@ def identified(
         options: settings of the fit; None lets the method choose.
         progress: told what is going on, a line at a time.
         experiments: look for excitations that would help, which takes a few seconds where something can't be determined.
+        foresight: say before the fit what the recordings can tell.
 
     Raises:
         InputError: the recordings don't determine the model, or can't be used.
@@ -86,7 +88,7 @@ def identified(
     for finding in checks:
         if finding.verdict in ("warning", "fault"):
             progress(f"{finding.verdict}: {finding.detail}{'; ' + finding.remedy if finding.remedy else ''}")
-    foreseen = _foreseen(structure, records, options, chosen, progress, experiments)
+    foreseen = _foreseen(structure, records, options, chosen, progress, experiments) if foresight else None
     progress(f"fitting {', '.join(structure.names)} by {chosen.id}")
     result = chosen.fit(structure, records, options)
     provenance = {

@@ -31,6 +31,9 @@ def bench(
     listed: Annotated[bool, typer.Option("--list", help="List the benchmarks, and measure nothing.")] = False,
     graph: Annotated[bool, typer.Option("--graph", help="With 'faults': in the running graph; takes half an hour.")] = False,
     recordings: Annotated[int | None, typer.Option("--recordings", help="With 'batch': how many to make and work on.")] = None,
+    hours: Annotated[
+        int | None, typer.Option("--hours", help="With 'long-recordings': the length of the only recording, in h.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed and accuracy on this machine; exit status 1 when a goal is missed."""
@@ -47,13 +50,18 @@ def bench(
     for name in chosen:
         if name not in BENCHMARKS:
             raise InputError("fric bench", f"no benchmark '{name}'", f"choose from {', '.join(BENCHMARKS)}")
-    if recordings is not None and (recordings < 1 or not any(BENCHMARKS[name].sized for name in chosen)):
-        raise InputError("--recordings", "goes with the benchmark 'batch'", "fric bench batch --recordings 1000")
+    sizes = {"recordings": recordings, "hours": hours}
+    for what, size in sizes.items():
+        takers = [name for name, benchmark in BENCHMARKS.items() if benchmark.sized and benchmark.size == what]
+        if size is not None and (size < 1 or not set(takers) & set(chosen)):
+            raise InputError(
+                f"--{what}", f"is 1 or more, and goes with: {', '.join(takers)}", f"fric bench {takers[0]} --{what} 24"
+            )
     figures = []
     for name in chosen:
         progress(f"measuring {BENCHMARKS[name].title}")
-        sized = BENCHMARKS[name].sized
-        figures += BENCHMARKS[name].run() if sized is None or recordings is None else sized(recordings)
+        sized, size = BENCHMARKS[name].sized, sizes[BENCHMARKS[name].size]
+        figures += BENCHMARKS[name].run() if sized is None or size is None else sized(size)
     if as_json:
         typer.echo(
             json.dumps(

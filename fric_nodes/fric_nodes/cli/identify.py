@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ from fric.method_settings import Options
 from .groups import Group, grouped
 from .identify_design import Design, design_alone, designed, limits_of
 from .identify_joints import ALL, identify_each
+from .identify_pieces import identify_pieces, refuse_too_large
 from .identify_shown import print_intervals, print_result
 from .options import Reading, progress, read_all
 from .results import Record as ResultRecord
@@ -44,6 +46,14 @@ class _Reading(Reading):
     joint: Annotated[
         str | None,
         typer.Option("--joint", help="Name of the joint, if the recording holds several; 'all' identifies each of them."),
+    ] = None
+    pieces: Annotated[
+        float | None,
+        typer.Option(
+            "--pieces",
+            help="Read and identify the recording in pieces of so many s, and put their parameters together: for recordings "
+            "that don't fit into memory, and for what changes over hours.",
+        ),
     ] = None
 
 
@@ -111,7 +121,7 @@ class _Asked:
     uncertainty: str
     options: Options
     design: Design
-    reading: Reading
+    reading: _Reading
     results: Results
 
 
@@ -127,6 +137,9 @@ def _identify(asked: _Asked) -> None:
     if gains and gains != len(asked.train):
         raise InputError("--gain", f"is given {gains} times for {len(asked.train)} recordings", "give it once for each")
     _refuse_overlap(asked.train, asked.validate)
+    if asked.reading.pieces is not None:
+        _in_pieces(asked, asked.reading.pieces)
+        return
     if asked.reading.joint == ALL:
         identify_each(
             [*asked.train, *asked.validate],
@@ -160,6 +173,7 @@ def _found(asked: _Asked) -> tuple[Identified, Method]:
     from fric.identification.uncertainty import assess
     from fric.identification.workflow import identified
 
+    refuse_too_large([*asked.train, *asked.validate], asked.reading)
     progress(f"reading {len(asked.train) + len(asked.validate)} recording(s)")
     records, validation = (read_all(list(each), asked.reading, as_recorded=True) for each in (asked.train, asked.validate))
     structure = to_fit(asked.terms if asked.model is None else asked.model, records[0].joint, records[0].units)
@@ -171,6 +185,38 @@ def _found(asked: _Asked) -> tuple[Identified, Method]:
         return Identified(fitted), chosen
     progress(f"computing intervals by {asked.uncertainty}")
     return Identified(fitted, assess(fitted.result, list(fitted.train), options, asked.uncertainty)), chosen
+
+
+def _in_pieces(asked: _Asked, seconds: float) -> None:
+    """The identification of one recording piece by piece.
+
+    Raises:
+        InputError: something else is asked for that needs the whole recording.
+    """
+    from fric.facade.structure import to_fit
+    from fric.identification.choice import method_for
+
+    others = {
+        "--validate": asked.validate,
+        "--design": asked.design.wanted,
+        "--uncertainty": asked.uncertainty,
+        "--joint all": asked.reading.joint == ALL,
+        "a second recording": asked.train[1:],
+    }
+    given = [name for name, value in others.items() if value]
+    if given:
+        raise InputError("--pieces", f"goes with one recording and one joint, not with {', '.join(given)}", "leave it out")
+    if not (math.isfinite(seconds) and seconds > 0.0):
+        raise InputError("--pieces", f"is {seconds}", "give a positive number of seconds")
+    identify_pieces(
+        asked.train[0],
+        seconds,
+        asked.reading,
+        asked.results,
+        lambda record: to_fit(asked.terms if asked.model is None else asked.model, record.joint, record.units),
+        lambda structure: method_for(asked.method, structure),
+        lambda method: _options_for(method, asked),
+    )
 
 
 def _options_for(method: Method, asked: _Asked) -> Options:

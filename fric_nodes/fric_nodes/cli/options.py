@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from fric.errors import InputError
@@ -61,6 +61,19 @@ class Reading:
         ),
     ] = ()
 
+    @property
+    def clock(self) -> Literal["stamp", "log"]:
+        """Clock of the samples.
+
+        Raises:
+            InputError: it is not one of the two.
+        """
+        if self.time == "stamp":
+            return "stamp"
+        if self.time == "log":
+            return "log"
+        raise InputError("--time", f"'{self.time}' is not known", "use stamp or log")
+
     def topic_names(self) -> Topics:
         """Names of the topics.
 
@@ -102,15 +115,13 @@ def read_all(paths: list[Path], reading: Reading, as_recorded: bool = False) -> 
     from fric.bagio.read import read_record
     from fric.identification.screen import screened
 
-    if reading.time not in {"stamp", "log"}:
-        raise InputError("--time", f"'{reading.time}' is not known", "use stamp or log")
     topics = reading.topic_names()
     records = [
         read_record(
             path,
             joint=reading.joint,
             topics=topics,
-            time="log" if reading.time == "log" else "stamp",
+            time=reading.clock,
             repair=reading.repair,
             start=reading.start,
             end=reading.end,
