@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from fric.bagio import BagError, BagWriter, Piece, pieces, read_record, write_record
 from fric.bagio.encode import float64_messages, joint_state_messages
+from fric.bagio.passing import Passing
 from fric.bagio.pieces import edges_of
+from fric.bagio.topics import Raw
 from fric.bagio.write import Compression, Storage
 from fric.errors import InputError
 from fric.record import Record
@@ -137,6 +140,32 @@ def test_a_recording_without_an_index(copy: Path, record: Record) -> None:
     position = np.concatenate([each.position for each in records])
     assert np.array_equal(position, record.position[: position.size])
     assert position.size > 0.3 * N
+
+
+def _raw(time: float) -> Raw:
+    return Raw("/joint_states", "", round(time * 1e9), b"")
+
+
+def test_windows_of_a_file_without_an_index_share_one_pass() -> None:
+    # Received at 0, 1, ... s; a few are written a little late, one far too late.
+    times = [*range(40), 39.5, *range(40, 70), 20.5, *range(70, 100)]
+    passes = []
+
+    def messages(topics: object = None) -> Iterator[Raw]:
+        passes.append(topics)
+        return map(_raw, times)
+
+    passing = Passing([SimpleNamespace(messages=messages)])  # type: ignore[list-item]
+    for first, stop in ((0.0, 32.0), (28.0, 62.0), (58.0, 101.0)):
+        found = [
+            message.log_time_ns * 1e-9 for message in passing.messages({"/joint_states"}, int(first * 1e9), int(stop * 1e9))
+        ]
+        assert sorted(found) == pytest.approx(sorted(each for each in times if first <= each < stop and each != 20.5))
+    assert len(passes) == 1
+    assert passing.late == 1
+    again = list(passing.messages({"/joint_states"}, 20 * 10**9, 22 * 10**9))
+    assert [message.log_time_ns for message in again] == [20 * 10**9, 21 * 10**9]
+    assert len(passes) == 2
 
 
 def test_a_command_before_a_piece_acts_in_it(tmp_path: Path) -> None:

@@ -46,6 +46,7 @@ def test_parameters_of_the_pieces_are_put_together(bag: Path, fric: Command, tmp
         assert entry["interval"][0] < entry["value"] < entry["interval"][1]
         assert entry["drift_interval"][0] < entry["drift_per_hour"] < entry["drift_interval"][1]
         assert entry["pieces"] == 4
+    assert any(note.startswith("in 4 of 4 pieces: # s at rest") for note in found["notes"]), found["notes"]
     assert json.loads((tmp_path / "out" / "result.json").read_text()) == found
     assert read_model(tmp_path / "out" / "model.yaml").value("mass") == pytest.approx(TRUE["mass"], rel=0.01)
     rows = list(csv.DictReader((tmp_path / "out" / "pieces.csv").read_text().splitlines()))

@@ -7,6 +7,7 @@ each message is read once. A recording without an index is passed through for ev
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -26,7 +27,7 @@ __all__ = ["Piece", "edges_of", "pieces"]
 
 _How = tuple[Topics, TimeFrom, EffortFrom, bool, Window]
 _SHORT = 0.5  # of a piece: a rest shorter than this belongs to the piece before, so that none is longer than 1.5 pieces
-_NO_INDEX = "the recording has no index: every piece is looked for in the whole of it"
+_NO_INDEX = "the recording has no index: it was passed through from its beginning"
 
 
 class Piece(NamedTuple):
@@ -99,8 +100,15 @@ def pieces(
             window = Window(zero + round(first * 1e9), zero + round(last * 1e9), before)
             piece, n_states = _read(source, Piece(first, last, None), (names, time, effort, repair, window), wanted)
             before = None if before is None or not n_states else before + n_states
+            if source.late:
+                piece = _with_note(piece, f"{source.late} messages so far were written too late to be in their piece")
             yield piece
             del piece  # before the next one is read
+
+
+def _with_note(piece: Piece, note: str) -> Piece:
+    record = piece.record
+    return piece if record is None else piece._replace(record=replace(record, notes=(*record.notes, note)))
 
 
 def _read(source: Source, piece: Piece, how: _How, wanted: tuple[str | None, Units | None]) -> tuple[Piece, int]:

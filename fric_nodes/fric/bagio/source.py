@@ -20,6 +20,7 @@ from rosbags.rosbag2 import Reader, ReaderError
 from ruamel.yaml.error import YAMLError, YAMLStreamError
 
 from .errors import BagError, DamagedError
+from .passing import Passing
 from .recover_mcap import McapScan, mcap_metadata
 from .recover_ros1 import Ros1Scan
 from .recover_sqlite import SqliteScan, has_journal, sqlite_metadata
@@ -84,6 +85,7 @@ class Source:
         self._stack = ExitStack()
         self._reader: Reader | None = None
         self._scans: list[McapScan | SqliteScan | Ros1Scan] = []
+        self._passing = Passing(self._scans)
         self._refusal = ""  # why the library does not read it
         files = self._find()
         try:
@@ -109,6 +111,11 @@ class Source:
         return self._reader is None
 
     @property
+    def late(self) -> int:
+        """Messages that a scan met too late to be in their window."""
+        return self._passing.late
+
+    @property
     def start_ns(self) -> int | None:
         """Time of reception of the first message [ns]; None when there is none."""
         if self._reader is not None:
@@ -125,17 +132,18 @@ class Source:
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]:
         """Messages of the window in the order of reception; of all topics when ``topics`` is None.
 
-        A window is found by the index of the storage. A scan has none: it passes through the whole file.
+        A window is found by the index of the storage. A scan has none: windows that move forward share one pass over the file.
 
         Raises:
             DamagedError: the storage turns out to be damaged on the way.
         """
         first, stop = self.window or (None, None)
         if self._reader is None:
+            if first is not None and stop is not None:
+                yield from self._passing.messages(topics, first, stop)
+                return
             for scan in self._scans:
-                for message in scan.messages(topics):
-                    if first is None or stop is None or first <= message.log_time_ns < stop:
-                        yield message
+                yield from scan.messages(topics)
             return
         chosen = [x for x in self._reader.connections if topics is None or x.topic in topics]
         if not chosen:

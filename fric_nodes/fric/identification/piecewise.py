@@ -9,6 +9,7 @@ or fitted is left out and says why.
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -29,7 +30,9 @@ __all__ = ["Combined", "Piecewise", "Row", "identified_piecewise"]
 _HOUR = 3600.0  # [s]
 _QUANTILE = 1.959963984540054  # statistical level: 95 % of a normal distribution lie within so many standard deviations
 _SERIOUS = ("warning", "fault")
-_REASONS = 5  # that are told one by one
+_REASONS = 5  # why pieces are left out, told one by one
+_REMARKS = 12  # on pieces, told one by one
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.,]*(e[-+]?\d+)?")
 _NEEDED = 3  # pieces for a line through them, of which one more than the line has coefficients leaves a residual
 
 
@@ -144,7 +147,7 @@ def identified_piecewise(
                 with linear_algebra_in_one():  # matrices are small: several threads wait for each other
                     found = _one(piece.record, begun, model)
                 model = found.result.model
-                seen.update({finding.check for finding in found.result.checks if finding.verdict in _SERIOUS})
+                seen.update(_remarks(found))
                 rows.append(_row(piece, found))
             except InputError as error:
                 refused = error.problem
@@ -199,6 +202,13 @@ def _row(piece: Piece, found: Fitted) -> Row:
     return Row(piece.begin, piece.end, values, errors)
 
 
+def _remarks(found: Fitted) -> set[str]:
+    """What is said of a piece, without its numbers, so that the same remark on many pieces is one."""
+    checks = (f"the check '{each.check}' has a {each.verdict}" for each in found.result.checks if each.verdict in _SERIOUS)
+    told = (*found.train[0].notes, *found.result.notes, *found.result.warnings)
+    return {*checks, *(_NUMBER.sub("#", text) for text in told)}
+
+
 def _line(row: Row) -> str:
     said = f"refused: {row.refused}" if row.refused else ", ".join(f"{name} {value:.5g}" for name, value in row.values.items())
     return f"{row.begin:.6g} s to {row.end:.6g} s: {said}"
@@ -229,8 +239,10 @@ def _notes(rows: Sequence[Row], combined: Sequence[Combined], seen: Counter[str]
         notes.append(f"{times} of {len(rows)} pieces are left out: {reason}")
     if len(refused) > _REASONS:
         notes.append(f"further pieces are left out for {len(refused) - _REASONS} other reasons")
-    for check, times in sorted(seen.items()):
-        notes.append(f"the check '{check}' has a warning or fault in {times} of {used} pieces; see fric doctor on a part")
+    for remark, times in seen.most_common(_REMARKS):
+        notes.append(f"in {times} of {used} pieces: {remark}")
+    if len(seen) > _REMARKS:
+        notes.append(f"and {len(seen) - _REMARKS} further kinds of remarks on single pieces")
     for each in combined:
         if each.pieces < used:
             notes.append(f"{each.name}: {used - each.pieces} of {used} pieces give no standard error and do not count")
