@@ -155,7 +155,7 @@ def test_windows_of_a_file_without_an_index_share_one_pass() -> None:
         passes.append(topics)
         return map(_raw, times)
 
-    passing = Passing([SimpleNamespace(messages=messages)])  # type: ignore[list-item]
+    passing = Passing([SimpleNamespace(messages=messages)])
     for first, stop in ((0.0, 32.0), (28.0, 62.0), (58.0, 101.0)):
         found = [
             message.log_time_ns * 1e-9 for message in passing.messages({"/joint_states"}, int(first * 1e9), int(stop * 1e9))

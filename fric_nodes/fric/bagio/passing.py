@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from itertools import chain
+from typing import Protocol
 
-from .scan import Scan
 from .topics import Raw
 
 __all__ = ["Passing"]
 
 _MIXED = 5_000_000_000  # [ns], a physical scale: how far in time caches of recorders mix messages
+
+
+class _Scan(Protocol):
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[Raw]: ...
 
 
 class Passing:
@@ -25,7 +29,7 @@ class Passing:
         late: messages that were written too late to be in their window.
     """
 
-    def __init__(self, scans: Sequence[Scan]) -> None:
+    def __init__(self, scans: Sequence[_Scan]) -> None:
         self.late = 0
         self._scans = scans
         self._left: Iterator[Raw] = iter(())
