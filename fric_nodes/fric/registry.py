@@ -11,9 +11,9 @@ A package of somebody else's adds members of any kind. It names itself under the
 and holds its members in modules or folders with the names of the catalogues here: ``my_axis/effects.py`` or
 ``my_axis/effects/my_law.py`` with a constant ``EFFECT``, likewise ``plants`` (``PLANT``), ``excitation`` (``EXCITATION``),
 ``importers`` (``IMPORTER``), ``methods`` (``METHOD``), ``estimators`` (``ESTIMATOR``), ``checks`` (``CHECK``), ``feedbacks``
-(``CONTROLLER``), ``feedforwards`` (``FEEDFORWARD``), ``benchmarks`` (``BENCHMARK``) and ``report`` (``REPORT``). Each is
-imported when its catalogue is, so that an effect must not import what is built on effects. A folder ``cli`` adds verbs to the
-command ``fric``, one per file: :mod:`fric_nodes.cli.main`.
+(``CONTROLLER``), ``feedforwards`` (``FEEDFORWARD``), ``benchmarks`` (``BENCHMARK``), ``peers`` (``PEER``) and ``report``
+(``REPORT``). Each is imported when its catalogue is, so that an effect must not import what is built on effects. A folder
+``cli`` adds verbs to the command ``fric``, one per file: :mod:`fric_nodes.cli.main`.
 """
 
 from __future__ import annotations

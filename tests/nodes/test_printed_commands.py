@@ -284,7 +284,7 @@ KNOWN: dict[str, Case] = {
             *(f"prove --cases {each} --out proof" for each in ("300 --seed 110", "100 --seed 20261126")),
             *("prove --inject bags/slide --model config/nominal_model.yaml --out proof", "bench long-recordings"),
             *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),
-            *(f"bench {each}" for each in ("batch", "wall-time", "tensor-product-control", "compensation", "circle")),
+            *(f"bench {each}" for each in ("batch", "wall-time", "tensor-product-control", "compensation", "circle", "peers")),
             *(f"bench calibration{it}" for it in ("", "-oscillation", "-forced", "-static", "-two-stage", "-tensor-product")),
         )
     },

@@ -22,6 +22,8 @@ IMPORTED_AS = {
     "backports": "backports.zstd",
     "yaml": "ruamel.yaml",
     "dask": "distributed",
+    "mcap": "mcap-ros2-support",  # brings it
+    "mcap_ros2": "mcap-ros2-support",
 }
 
 
@@ -72,7 +74,7 @@ def test_every_import_is_a_dependency() -> None:
             elif isinstance(each, ast.Import):
                 imported |= {alias.name.split(".")[0] for alias in each.names}
     imported -= {*sys.stdlib_module_names, "fric", "fric_nodes", "fric_interfaces"}
-    extras = {name(each) for head in ("batch = [", "can = [", "control = [") for each in listed(head)}
+    extras = {name(each) for head in ("batch = [", "can = [", "control = [", "peers = [") for each in listed(head)}
     known = {*RUN, *extras, *(each.removeprefix("ros-").replace("-", "_") for each in RUN)}
     missing = {each for each in imported if IMPORTED_AS.get(each, each.lower()) not in known}
     # Parts of what is listed: message generators and the index come with rclpy, apsw with rosbags, can with python-can; and of

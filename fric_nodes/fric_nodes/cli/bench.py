@@ -14,6 +14,7 @@ from .printed import console, plain_table
 
 if TYPE_CHECKING:
     from fric.bench import Benchmark
+    from fric.figure import Figure
 
 __all__ = ["register"]
 
@@ -62,24 +63,41 @@ def bench(
         progress(f"measuring {BENCHMARKS[name].title}")
         sized, size = BENCHMARKS[name].sized, sizes[BENCHMARKS[name].size]
         figures += BENCHMARKS[name].run() if sized is None or size is None else sized(size)
-    if as_json:
-        typer.echo(
-            json.dumps(
-                [{"name": f.name, "value": f.value, "unit": f.unit, "goal": f.goal, "reached": f.reached} for f in figures]
-            )
-        )
-    else:
-        table = plain_table(("figure", "measured", "goal"), numbers=("measured",))
-        for figure in figures:
-            mark = "" if figure.reached is None else " reached" if figure.reached else " missed"
-            unit = "" if figure.unit == "1" else f" {figure.unit}"
-            table.add_row(figure.name, f"{figure.value:.4g}{unit}", f"{figure.goal}{unit}{mark}" if figure.goal else "")
-        console().print(table)
+    _print(figures, as_json)
     left_out = [name for name in BENCHMARKS if name not in chosen] if not names else []
     if left_out:
         progress(f"left out, since they take long: {', '.join(left_out)} (name them, or --all)")
     if any(figure.reached is False for figure in figures):
         raise typer.Exit(1)
+
+
+def _print(figures: Sequence[Figure], as_json: bool) -> None:
+    """Print what was measured, and why the rest was not."""
+    if as_json:
+        typer.echo(json.dumps([_as_json(figure) for figure in figures]))
+        return
+    table = plain_table(("figure", "measured", "goal"), numbers=("measured",))
+    for figure in figures:
+        mark = "" if figure.reached is None else " reached" if figure.reached else " missed"
+        unit = "" if figure.unit == "1" else f" {figure.unit}"
+        spread = "" if figure.low is None or figure.high is None else f" ({figure.low:.3g} to {figure.high:.3g})"
+        measured = "skipped" if figure.skipped else f"{figure.value:.4g}{spread}{unit}"
+        table.add_row(figure.name, measured, f"{figure.goal}{unit}{mark}" if figure.goal else "")
+    console().print(table)
+    for figure in figures:
+        if figure.skipped:
+            typer.echo(f"skipped: {figure.name}: {figure.skipped}")
+
+
+def _as_json(figure: Figure) -> dict[str, object]:
+    """A figure; ``low`` and ``high`` where it was repeated, ``skipped`` where it was not measured."""
+    found: dict[str, object] = {
+        "name": figure.name, "value": None if figure.skipped else figure.value, "unit": figure.unit,
+        "goal": figure.goal, "reached": figure.reached,
+    }  # fmt: skip
+    if figure.low is not None:
+        found |= {"low": figure.low, "high": figure.high}
+    return found | ({"skipped": figure.skipped} if figure.skipped else {})
 
 
 def _list(benchmarks: Sequence[Benchmark], as_json: bool) -> None:

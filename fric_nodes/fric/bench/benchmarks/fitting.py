@@ -24,15 +24,17 @@ from ...simulation import simulate
 from ..benchmark import Benchmark
 from ..by_scipy import fit_by_scipy
 
-__all__ = ["BENCHMARK"]
+__all__ = ["BENCHMARK", "HELD", "NAMES", "STRIBECK", "recording", "structure", "truth"]
 
 _N_SAMPLES = 24_841
 _STRETCH = 4_000
-_STRIBECK = 0.02  # [m/s]
+STRIBECK = 0.02
+"""Velocity of the Stribeck curve [m/s]; held in the fit."""
 
 
-def _recording() -> Record:
-    truth = build_model(
+def truth() -> Model:
+    """The axis that is simulated."""
+    return build_model(
         "rigid",
         {"mass": 95.0},
         [
@@ -40,14 +42,18 @@ def _recording() -> Record:
             term("viscous", coefficient=200.0),
             term("asymmetry", coefficient=-37.0),
             term("bias", force=-3.0),
-            term("stribeck", force=5.0, velocity=0.02),
+            term("stribeck", force=5.0, velocity=STRIBECK),
         ],
     )
+
+
+def recording() -> Record:
+    """The recording of it."""
     generator = np.random.default_rng(7)
     at = np.arange(_N_SAMPLES, dtype=np.float64) * 1e-3
     effort = sum(30.0 * np.sin(2 * np.pi * f * at + p) for f, p in ((0.16, 0.0), (0.41, 1.0), (1.07, 2.0), (2.3, 0.5)))
     effort = np.asarray(effort) - 3.0
-    motion = simulate(truth, effort, 1e-3, n_substeps=4)
+    motion = simulate(truth(), effort, 1e-3, n_substeps=4)
     resolution = 1e-7
     position = np.round(motion.position / resolution) * resolution
     return Record(
@@ -55,7 +61,8 @@ def _recording() -> Record:
     )
 
 
-def _structure() -> Model:
+def structure() -> Model:
+    """What is fitted, with its start values."""
     return build_model(
         "rigid",
         {"mass": 1.0},
@@ -64,14 +71,15 @@ def _structure() -> Model:
             term("viscous", coefficient=1.0),
             term("asymmetry"),
             term("bias", force=0.0),
-            term("stribeck", force=0.0, velocity=_STRIBECK),
+            term("stribeck", force=0.0, velocity=STRIBECK),
         ],
     )
 
 
-# Six free: mass, Coulomb, viscous, its asymmetry, bias, Stribeck surplus.
-_OPTIONS = Options(held=("asymmetry.force", "stribeck.velocity"))
-_NAMES = ("mass", "coulomb.force", "stribeck.force", "asymmetry.coefficient", "viscous.coefficient", "bias.force")
+HELD = ("asymmetry.force", "stribeck.velocity")
+_OPTIONS = Options(held=HELD)
+NAMES = ("mass", "coulomb.force", "stribeck.force", "asymmetry.coefficient", "viscous.coefficient", "bias.force")
+"""The six free parameters."""
 
 
 def _timed(method: str, record: Record, options: Options) -> tuple[Identification, float]:
@@ -79,7 +87,7 @@ def _timed(method: str, record: Record, options: Options) -> tuple[Identificatio
     spent = np.inf
     for _ in range(2):
         start = time.perf_counter()
-        found = METHODS[method].fit(_structure(), [record], options)
+        found = METHODS[method].fit(structure(), [record], options)
         spent = min(spent, time.perf_counter() - start)
     return found, spent
 
@@ -89,7 +97,7 @@ def _beside_scipy(record: Record, whole: float) -> list[Figure]:
     part = record.slice(0, _STRETCH)
     begun, _ = _timed("inverse-dynamics", part, _OPTIONS)
     mine, spent = _timed("output-error", part, _OPTIONS)
-    other = fit_by_scipy(part, np.array([begun.model.value(name) for name in _NAMES]), _STRIBECK)
+    other = fit_by_scipy(part, np.array([begun.model.value(name) for name in NAMES]), STRIBECK)
     label = f"{_STRETCH:,} samples"
     reckoned = other.spent * _N_SAMPLES / _STRETCH
     return [
@@ -104,8 +112,8 @@ def _beside_scipy(record: Record, whole: float) -> list[Figure]:
 
 def run() -> list[Figure]:
     """Time of the fits after compilation."""
-    record = _recording()
-    METHODS["output-error"].fit(_structure(), [record.slice(0, 3000)], _OPTIONS)
+    record = recording()
+    METHODS["output-error"].fit(structure(), [record.slice(0, 3000)], _OPTIONS)
     _, inverse = _timed("inverse-dynamics", record, _OPTIONS)
     found, spent = _timed("output-error", record, _OPTIONS)
     _, in_runs = _timed("output-error", record, replace(_OPTIONS, horizon=0.5))

@@ -14,15 +14,16 @@ from ...bagio.write import BagWriter, Storage
 from ...figure import Figure
 from ..benchmark import Benchmark
 
-__all__ = ["BENCHMARK"]
+__all__ = ["BENCHMARK", "write_bag"]
 
 _N_SAMPLES = 60_000
 _REPEATS = 3
 
 
-def _write(path: Path, storage: Storage) -> None:
-    stamp = np.arange(_N_SAMPLES, dtype=np.int64) * 1_000_000
-    signal = np.sin(np.arange(_N_SAMPLES) * 1e-3)
+def write_bag(path: Path, storage: Storage, n_samples: int = _N_SAMPLES) -> None:
+    """Write joint states and force commands, so many of each at 1 kHz."""
+    stamp = np.arange(n_samples, dtype=np.int64) * 1_000_000
+    signal = np.sin(np.arange(n_samples) * 1e-3)
     with BagWriter(path, storage=storage) as bag:
         bag.topic("/joint_states", "sensor_msgs/msg/JointState")
         bag.topic("/force_command", "fric_interfaces/msg/StampedForce")
@@ -40,7 +41,7 @@ def run() -> list[Figure]:
     with tempfile.TemporaryDirectory() as folder:
         for storage in storages:
             path = Path(folder) / storage
-            _write(path, storage)
+            write_bag(path, storage)
             spent = []
             for _ in range(_REPEATS):
                 start = time.perf_counter()
