@@ -16,7 +16,10 @@ COMPILED = {"compiled", "compiled_loop", "kernel", "loop", "njit"}
 """Decorators of :mod:`fric.engine.kernel` and numba: what they compile is one piece, since a call would cost time."""
 
 EXEMPT: dict[str, str] = {
-    "fric_nodes/fric/diagnosis": "is being rebuilt as a whole: score, observer, search and their like take its place",
+    "fric_nodes/fric/diagnosis/diagnose.py": "is still to be split",
+    "fric_nodes/fric/diagnosis/grow.py": "is still to be split",
+    "fric_nodes/fric/diagnosis/ladder.py": "is still to be split",
+    "fric_nodes/fric/diagnosis/rivals.py": "is still to be split",
 }
 """Folders and files that are over the limits for now, each with its reason; one that no longer is has to go from here."""
 

@@ -15,7 +15,8 @@ import numpy as np
 from ..model import Model, Term
 from ..plants import PLANTS
 from ..record import Array
-from .track import Bounds, Track, fitted_values
+from .least_squares import Bounds, fitted_values
+from .track import Track
 
 __all__ = ["Along"]
 

@@ -22,7 +22,8 @@ from ..model import Model, Term
 from ..parameter import Parameter
 from ..plants import PLANTS
 from ..record import Array
-from .track import Track, smooth
+from .motion import smooth
+from .track import Track
 from .universe import worth_trying
 
 __all__ = ["FRICTION", "Candidate", "Scales", "candidates", "fewest_cycles", "scales_of"]

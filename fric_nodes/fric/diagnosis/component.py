@@ -22,9 +22,11 @@ import numpy as np
 from ..model import Model
 from ..record import Array
 from .candidates import FRICTION, place_of
+from .least_squares import Fit
+from .motion import Motion
 from .pieces import amplitudes_of, in_pieces
 from .screen import Tried
-from .track import Fit, Motion, Track
+from .track import Track
 
 __all__ = ["Signature", "agreed", "signatures"]
 

@@ -35,6 +35,7 @@ from .fitting import best_track, bounds_of, refit
 from .grow import Growth, by_parts, first_terms, grow, helped, leaves_much, surpassing, together, with_moves, without_nothings
 from .held_back import OnlyThere, only_there
 from .ladder import concluded_by_means, ladder_of
+from .least_squares import Fit
 from .limits import limits_of
 from .locate import Where, locate, moved_back, steady
 from .other_laws import strained
@@ -67,7 +68,7 @@ from .start import (
     started,
     tracks_of,
 )
-from .track import Fit, Track
+from .track import Track
 from .twin import twins
 
 __all__ = ["DiagnosisError", "diagnose", "refit_noe"]

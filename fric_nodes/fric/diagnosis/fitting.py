@@ -14,8 +14,9 @@ from ..record import Array
 from ..threads import mapped
 from .along import Along
 from .candidates import Scales, fewest_cycles, scales_of
+from .least_squares import Bounds, Fit
 from .screen import Gram, Tried, blocks_of, restraint
-from .track import Bounds, Fit, Track
+from .track import Track
 from .twin import twins
 
 __all__ = [

@@ -18,7 +18,8 @@ import numpy as np
 from ..model import Model
 from ..record import Array
 from .candidates import Scales
-from .track import Track, smooth
+from .motion import smooth
+from .track import Track
 
 __all__ = ["Where", "direction", "locate"]
 

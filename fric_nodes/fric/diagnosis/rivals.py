@@ -12,9 +12,10 @@ from ..threads import mapped
 from .along import Along
 from .candidates import Scales
 from .fitting import Beginning, State, begun, bounds_of, free_names, is_driven, shaken, unseen
+from .least_squares import Fit
 from .other_laws import laws_beside, laws_further, told
 from .screen import Screening, Tried
-from .track import Fit, Track
+from .track import Track
 
 __all__ = [
     "BY_CHANCE",

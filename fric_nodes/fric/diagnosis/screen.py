@@ -24,7 +24,8 @@ from ..threads import mapped
 from .along import Along
 from .candidates import Candidate
 from .fine import fine_periods
-from .track import Fit, Track
+from .least_squares import Fit
+from .track import Track
 
 __all__ = ["Column", "Gram", "Promise", "Screening", "Tried", "blocks_of", "columns_of", "restraint", "screen"]
 

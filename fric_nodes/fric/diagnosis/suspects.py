@@ -19,9 +19,10 @@ from ..threads import mapped
 from .along import Along
 from .candidates import candidates, place_of, scales_of
 from .fitting import bounds_of, free_names, with_amplitudes
+from .least_squares import Fit
 from .locate import locate, moved_back, steady
 from .screen import Gram, Promise, blocks_of, columns_of
-from .track import Fit, Track
+from .track import Track
 
 __all__ = ["Suspects", "prepare_suspects", "suspects"]
 

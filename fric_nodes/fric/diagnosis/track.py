@@ -24,46 +24,37 @@ Source: the gains are those of the alpha-beta filter in :mod:`fric.identificatio
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import binary_dilation
-from scipy.signal import butter, lfilter, sosfiltfilt
+from scipy.signal import lfilter
 
-from ..identification.gauss_newton import Solution, minimise
-from ..identification.innovations import Run, runs_of
+from ..identification.innovations import Run
 from ..model import Model, Term
 from ..plants import PLANTS
-from ..record import Array, Index, Record
-from ..signals.resolution import noise_of, step_of
+from ..record import Array
 from ..simulation import respond, substeps
 from ..threads import n_threads
+from .least_squares import Bounds, Fit, fitted_values
+from .motion import Motion, along, motion_of
+from .runs import SMOOTH_LED, Runs
 from .universe import universe_of
 
-__all__ = ["Bounds", "Fit", "Motion", "Track", "Twin", "fitted_values", "smooth"]
+__all__ = ["Track", "Twin"]
 
-_SMOOTH = 4.0  # times the bandwidth: of the motion along which a force is needed
-_SMOOTH_LED = 2.0  # the same, where a contact is led: less of the encoder's noise
 _SMEARED = 3.0  # time constants of that, over which it smears a turn
 _NEXT_TO_NOTHING = 1e-12  # [x/s], a speed that only has a sign
 _STEP_OF_RATE = 0.2
 _MOST_STEPS = 4  # per sample: the step is implicit, and what is faster than the observer changes nothing that it sees
 _STEP_OF_OBSERVER = 0.4  # of the observer's time constant: shorter ones it can't tell from this
-_UNSURE = 0.2  # of the variance of noise
-_SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
-_OVER = 0.3  # [s] after which it doesn't matter where in its gap a body began, how its spring was bent or a command had come
-_FORGOTTEN = 3.0  # [s] the same for what friction remembers, and for what rings on the body
 _MOST_GAIN = 2.5  # times gain and 2 alpha + beta; at 4 the pursuit of a mass begins to swing
 _LIGHTEST = 4.0  # times lighter than the mass whose impulses lead it, a model at most
 _NOTHING = np.zeros(1)
-_TINY = 1e-9  # of its scale, the least that a positive parameter may be
-_SHORTEST = 200  # samples of a run
-_FEWEST = 50  # intervals of a past that tells anything
 _FIRST = 5  # samples, from which the force at its beginning is taken
-_SHAKEN = 0.4  # steps of the encoder that count as its noise
 _LARGEST = 1e6  # of the force range; a model that escapes must cost much, not break the solver
 
 
@@ -83,226 +74,17 @@ class Twin:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """The measured motion of one run, smoothed, in the middle of each interval.
+class Track(Runs):
+    """Runs that models follow by the impulses described above, and what each model lacks in them.
 
-    Attributes:
-        position: [x], shape ``(n,)`` as the next two.
-        velocity: [x/s].
-        acceleration: [x/s^2].
-        step: between them [s].
+    Its attributes are those of :class:`fric.diagnosis.runs.Runs`.
     """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    step: float
-
-
-@dataclass(frozen=True, eq=False)
-class Past:
-    """What came before a run.
-
-    Attributes:
-        run: the intervals before it.
-        time: at their ends [s].
-        cutoff: at which their motion is smoothed [rad/s].
-    """
-
-    run: Run
-    time: Array
-    cutoff: float
-
-    @cached_property
-    def motion(self) -> Motion:
-        """The measured motion, smoothed."""
-        return _motion(self.run, self.cutoff)
-
-    @cached_property
-    def raw_motion(self) -> Motion:
-        """The measured motion, as the encoder gives it."""
-        return _motion(self.run, math.inf)
-
-
-def along(
-    model: Model,
-    run: Run,
-    time: Array,
-    motion: Motion,
-    velocity: Array,
-    states: tuple[Array, Array],
-    extra: Term | None = None,
-) -> Array:
-    """The force [F] that ``model``, with the term ``extra``, needs along the positions of ``motion``, shape ``(n,)``.
-
-    It has the ``velocity`` [x/s]; its inner ``states`` are led on in place.
-    """
-    universe = universe_of(model)
-    values = universe.values(model)
-    if extra is not None:
-        universe.put(values, extra)
-    needed, friction = np.empty_like(velocity), np.empty_like(velocity)
-    universe.loops.predict(
-        values, time - 0.5 * motion.step, motion.position, velocity, motion.acceleration,
-        motion.step, run.load, run.temperature, *states, needed, friction,
-    )  # fmt: skip
-    return needed
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """Recordings to follow, and how.
-
-    Attributes:
-        runs: contiguous parts of the recordings.
-        time: start of each run in its record [s].
-        record: number of each run's record.
-        bandwidth: w [rad/s].
-        mass: by which being behind becomes a force [F s^2/x].
-        noise: of the position for each run [x].
-        sizes: typical size of a linear parameter by its dimension, for those that are near zero.
-        lead: intervals at the beginning of each run that come before the part that counts, so that a model's states are those
-            of the axis there.
-        past: what came before each run, if it is a part of one: models that remember for longer are led along it.
-        late: part of a sample by which the force acts after its stamps, where its hold isn't known.
-        given: mass that the axis is said to have [F s^2/x]; None where nothing else is said than ``mass``.
-    """
-
-    runs: tuple[Run, ...]
-    time: tuple[Array, ...]
-    record: tuple[int, ...]
-    bandwidth: float
-    mass: float
-    noise: tuple[float, ...]
-    sizes: Mapping[str, float]
-    lead: tuple[int, ...]
-    past: tuple[Past | None, ...]
-    late: float = 0.0
-    given: float | None = None
-
-    @classmethod
-    def of(cls, records: Sequence[Record], bandwidth: float, model: Model, late: float = 0.0) -> Track:
-        """Follow ``records`` with ``bandwidth`` [rad/s]; the inertia of ``model`` sets the scale."""
-        runs: list[Run] = []
-        time: list[Array] = []
-        number: list[int] = []
-        noise: list[float] = []
-        for k, record in enumerate(records):
-            found = runs_of(record, late)
-            bounds = np.flatnonzero(np.diff(np.concatenate([[False], record.mask, [False]]).astype(np.int8)))
-            starts = [int(first) for first, last in zip(bounds[::2], bounds[1::2], strict=True) if last - first >= _SHORTEST]
-            for run, first in zip(found, starts, strict=True):
-                runs.append(run)
-                time.append(record.time[first] + np.cumsum(run.step))
-                number.append(k)
-                noise.append(max(noise_of(run.position), _SHAKEN * step_of(run.position)))
-        mass = model.total_inertia
-        return cls(
-            tuple(runs),
-            tuple(time),
-            tuple(number),
-            bandwidth,
-            mass,
-            tuple(noise),
-            _sizes(runs, mass),
-            (0,) * len(runs),
-            (None,) * len(runs),
-            late,
-        )
-
-    def parts(self, spans: Sequence[tuple[int, int, int]]) -> Track:
-        """The parts of the recordings in ``spans``: run, first and last interval (exclusive) of each."""
-        runs, time, leads, pasts = [], [], [], []
-        for k, first, last in spans:
-            run, h = self.runs[k], self.runs[k].sample_time
-            lead = min(first, math.ceil(_OVER / h))
-            begin = first - lead
-            before = min(begin, math.ceil((_FORGOTTEN - _OVER) / h))
-            runs.append(run.part(begin, last))
-            time.append(self.time[k][begin:last])
-            leads.append(lead)
-            span = slice(begin - before, begin)
-            past = Past(run.part(span.start, span.stop), self.time[k][span], _SMOOTH * self.bandwidth)
-            pasts.append(past if before > _FEWEST else None)
-        return replace(
-            self,
-            runs=tuple(runs),
-            time=tuple(time),
-            record=tuple(self.record[k] for k, _, _ in spans),
-            noise=tuple(self.noise[k] for k, _, _ in spans),
-            lead=tuple(leads),
-            past=tuple(pasts),
-        )
-
-    @property
-    def masses(self) -> tuple[float, ...]:
-        """Masses that the axis may well have: that of the model with which the recordings are followed, and the given one."""
-        return (self.mass,) if self.given is None else (self.mass, self.given)
-
-    @cached_property
-    def travel(self) -> float:
-        """From the lowest to the highest position of all runs [x]."""
-        return max(float(np.ptp(np.concatenate([run.position for run in self.runs]))), 1e-300)
-
-    @cached_property
-    def unsure(self) -> bool:
-        """Whether more than the noise of its samples makes the force between them unsure.
-
-        What stands out then goes with the motion, as friction does: a form that noise can't have says nothing.
-        """
-        between = sum(float(np.sum(run.between**2)) for run in self.runs)
-        noise = sum(float(run.effort_noise**2 * run.effort.shape[0]) for run in self.runs)
-        return between > _UNSURE * noise
-
-    @property
-    def n_samples(self) -> int:
-        """Intervals that count."""
-        return sum(run.effort.shape[0] - lead for run, lead in zip(self.runs, self.lead, strict=True))
-
-    @property
-    def starts(self) -> Index:
-        """First residual of each run."""
-        return np.cumsum([0, *(run.effort.shape[0] - self._settling(k) for k, run in enumerate(self.runs))])[:-1]
-
-    @property
-    def independent(self) -> float:
-        """About how many independent numbers a residual holds: it is low-passed."""
-        last = [float(np.sum(run.step[lead:])) for run, lead in zip(self.runs, self.lead, strict=True)]
-        return 0.5 * self.bandwidth * sum(last)
-
-    def _settling(self, k: int) -> int:
-        """Intervals of run ``k`` that don't count: those that lead to it, or until the observer has settled."""
-        return max(self.lead[k], min(self._settled(k), len(self.runs[k].effort) // 3))
-
-    def _settled(self, k: int) -> int:
-        """Intervals until the observer has settled in run ``k``."""
-        return max(math.ceil(_SETTLING / (self.bandwidth * self.runs[k].sample_time)), 20)
 
     def _first(self, model: Model, k: int) -> int:
         """Interval of run ``k`` at which ``model`` has to begin, to be where the axis is when it counts."""
         if _remembers(model) or model.plant is PLANTS[model.plant.id].driven:
             return 0
-        return max(self.lead[k] - self._settled(k), 0)
-
-    def joined(self, of_run: Sequence[Array]) -> Array:
-        """Signals with one value per interval of each run, without the settling, joined, shape ``(n,)``."""
-        return np.concatenate([part[self._settling(k) :] for k, part in enumerate(of_run)])
-
-    def split(self, joined: Array) -> list[Array]:
-        """What :meth:`joined` gives, per run."""
-        return np.split(joined, self.starts[1:])
-
-    def padded(self, joined: Array) -> list[Array]:
-        """What :meth:`joined` gives, per run, with zeros where the observer was settling."""
-        parts = []
-        for run, part in zip(self.runs, self.split(joined), strict=True):
-            parts.append(np.concatenate([np.zeros(run.effort.shape[0] - part.shape[0]), part]))
-        return parts
-
-    def gains(self, run: Run) -> tuple[float, float]:
-        """Alpha and beta at the run's sample time."""
-        z = math.exp(-self.bandwidth * run.sample_time)
-        return 1.0 - z * z, (1.0 - z) ** 2
+        return max(self.lead[k] - self.settled(k), 0)
 
     def residual(self, model: Model, twin: Twin | None = None) -> Array:
         """The force that ``model`` lacks [F] at the end of each interval, shape ``(n,)``; on a ``twin`` of the recordings."""
@@ -354,7 +136,7 @@ class Track:
             motion, effort = self.led_motion[k], run.effort
             if twin is not None:
                 effort = twin.efforts[k]
-                motion = _motion(replace(run, position=twin.positions[k]), _SMOOTH_LED * self.bandwidth)
+                motion = motion_of(replace(run, position=twin.positions[k]), SMOOTH_LED * self.bandwidth)
             found.append(self.borne(model, k, motion, effort) - effort)
         return self._finite(self.seen(found))
 
@@ -368,8 +150,8 @@ class Track:
         speed = np.abs(motion.velocity)
         turns = np.diff(np.sign(motion.velocity), append=0.0) != 0.0
         # A filter that takes the noise off the motion smears its turns.
-        reach = math.ceil(_SMEARED / (_SMOOTH_LED * self.bandwidth * motion.step))
-        loose = binary_dilation((speed <= self._rest(k)) | turns, iterations=reach)
+        reach = math.ceil(_SMEARED / (SMOOTH_LED * self.bandwidth * motion.step))
+        loose = binary_dilation((speed <= self.rest(k)) | turns, iterations=reach)
         speed = np.maximum(speed, _NEXT_TO_NOTHING)
         ahead, back = (self._along(model, k, motion, np.where(loose, way, motion.velocity)) for way in (speed, -speed))
         return np.clip(effort, np.minimum(ahead, back), np.maximum(ahead, back))
@@ -378,17 +160,6 @@ class Track:
         """The force [F] along the positions of ``motion`` with ``velocity`` [x/s], shape ``(n,)``."""
         states = self.inner_states(model, k, float(motion.velocity[0]))
         return along(model, self.runs[k], self.time[k], motion, velocity, states)
-
-    def _rest(self, k: int) -> float:
-        """Speed [x/s] below which the noise of run ``k`` doesn't tell motion from rest."""
-        # White noise, differentiated up to the cut: its variance times h/pi times the integral of the frequency squared.
-        cut = min(_SMOOTH_LED * self.bandwidth, math.pi / self.runs[k].sample_time)
-        return 3.0 * self.noise[k] * math.sqrt(self.runs[k].sample_time * cut**3 / (3.0 * math.pi))
-
-    @cached_property
-    def led_motion(self) -> tuple[Motion, ...]:
-        """The measured motion of each run, as it leads a contact."""
-        return tuple(_motion(run, _SMOOTH_LED * self.bandwidth) for run in self.runs)
 
     def needed(self, model: Model, extra: Term | None = None) -> Array:
         """As :meth:`residual`, by the force that ``model``, with the term ``extra``, needs along the measured motion [F]."""
@@ -403,16 +174,6 @@ class Track:
         """``signal`` without what no solver can use."""
         most = _LARGEST * max(float(np.ptp(run.effort)) for run in self.runs)
         return np.clip(np.nan_to_num(signal, nan=most, posinf=most, neginf=-most), -most, most)
-
-    @cached_property
-    def motion(self) -> tuple[Motion, ...]:
-        """The measured motion of each run."""
-        return tuple(_motion(run, _SMOOTH * self.bandwidth) for run in self.runs)
-
-    @cached_property
-    def raw_motion(self) -> tuple[Motion, ...]:
-        """The measured motion of each run, as the encoder gives it: a filter would stretch bristles that are stiff."""
-        return tuple(_motion(run, math.inf) for run in self.runs)
 
     def _applied(self, model: Model) -> list[Array]:
         """What comes out of the command path of ``model`` [F], per run; that of the last model is kept."""
@@ -439,13 +200,6 @@ class Track:
         along(model, past.run, past.time, motion, motion.velocity, states)
         return states
 
-    def begin(self, k: int, first: int = 0) -> float:
-        """Time in its recording at which interval ``first`` of run ``k`` begins [s].
-
-        A part must not take a slow drift for a new one.
-        """
-        return float(self.time[k][first] - self.runs[k].step[first])
-
     def n_substeps(self, model: Model, run: Run) -> int:
         """Steps of ``model`` per sample, enough for what the observer sees.
 
@@ -456,27 +210,12 @@ class Track:
         return min(substeps(model, run.sample_time, _STEP_OF_RATE), most)
 
     def seen(self, of_run: Sequence[Array]) -> Array:
-        """A force per interval as the observer would see it, were it missing: filtered, joined, shape ``(n,)``."""
+        """The residual that a missing force per interval would give [F]: low-passed and joined, shape ``(n,)``."""
         parts = []
         for run, force in zip(self.runs, of_run, strict=True):
             alpha, beta = self.gains(run)
             parts.append(np.asarray(lfilter([0.0, beta], [1.0, alpha + beta - 2.0, 1.0 - alpha], force), dtype=np.float64))
         return self.joined(parts)
-
-    def scale(self, model: Model, names: Sequence[str]) -> Array:
-        """Size of each of the parameters ``names``.
-
-        A parameter near zero gets that of what would matter, or it could never leave; a period that of one cycle more or less
-        over the travel.
-        """
-        values, declared = model.values, [parameter.declaration for parameter in model.parameters()]
-        index = [model.names.index(name) for name in names]
-        scale = np.array([max(abs(values[k]), self.sizes.get(declared[k].dimension, 0.0)) for k in index])
-        for place, k in enumerate(index):
-            if declared[k].name == "period":
-                scale[place] = min(abs(values[k]), values[k] ** 2 / self.travel)
-        scale[scale == 0.0] = 1.0
-        return scale
 
     def fit(
         self,
@@ -514,102 +253,6 @@ class Track:
         return Fit(found, tuple(names), answer, scale)
 
 
-def _sizes(runs: Sequence[Run], mass: float) -> dict[str, float]:
-    """A twentieth of what the forces and motions of the runs would make a linear parameter."""
-    if not runs:
-        return {}
-    force = 0.05 * max(float(np.std(np.concatenate([run.effort for run in runs]))), 1e-12)
-    speed = max([1e-12, *(float(np.std(np.diff(run.position) / run.step[1:])) for run in runs)])
-    travel = max(float(np.ptp(np.concatenate([run.position for run in runs]))), 1e-12)
-    return {
-        "F": force,
-        "F s/x": force / speed,
-        "F s^2/x^2": force / speed**2,
-        "F/x": force / travel,
-        "F/x^3": force / travel**3,
-        "F s^2/x": 0.05 * mass,
-        "1": 0.05,
-    }
-
-
-Bounds = dict[str, tuple[float, float]]
-
-
-def fitted_values(
-    residual: Callable[[Model], Array], model: Model, names: Sequence[str], scale: Array, bounds: Bounds, **how: Any
-) -> tuple[Model, Solution]:
-    """``model`` with the parameters ``names`` such that the ``residual`` is least, and the solution in units of ``scale``.
-
-    Args:
-        residual: of a model [F], shape ``(n,)``.
-        model: to begin with.
-        names: of the free parameters.
-        scale: of each of them.
-        bounds: of some of them, beside those that they were declared with.
-        how: tolerances and limits of :func:`fric.identification.gauss_newton.minimise`.
-    """
-    index = np.array([model.names.index(name) for name in names], dtype=np.int64)
-    declared = [parameter.declaration for parameter in model.parameters()]
-    lower, upper = np.empty(index.shape[0]), np.empty(index.shape[0])
-    for k, name in enumerate(names):
-        p = declared[index[k]]
-        low, high = bounds.get(name, (-np.inf, np.inf))
-        lower[k], upper[k] = max(p.lower, low, _TINY * scale[k] if p.positive else -np.inf), min(p.upper, high)
-    values = model.values
-
-    def at(point: Array) -> Model:
-        trial = values.copy()
-        trial[index] = point * scale
-        return model.with_values(trial)
-
-    answer = minimise(lambda point: residual(at(point)), values[index] / scale, lower / scale, upper / scale, **how)
-    return at(answer.point), answer
-
-
 def _remembers(model: Model) -> bool:
     """True for a model whose force hangs on what was before."""
     return model.has_slip_dynamics or any(held.effect.n_memory for held in model.terms)
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A model that has been fitted to a track.
-
-    Attributes:
-        model: with its values.
-        names: of the parameters that were free.
-        solution: residual [F] and Jacobian at the optimum, in units of ``scale``.
-        scale: of each free parameter.
-    """
-
-    model: Model
-    names: tuple[str, ...]
-    solution: Solution
-    scale: Array
-
-    @property
-    def residual(self) -> Array:
-        """The force that is missing [F], shape ``(n,)``."""
-        return self.solution.residual
-
-    @property
-    def jacobian(self) -> Array:
-        """Derivative of the residual, shape ``(n, n_free)``, per ``scale`` of each parameter."""
-        return self.solution.jacobian
-
-
-def smooth(signal: Array, step: float, cutoff: float) -> Array:
-    """``signal`` without what is faster than ``cutoff`` [rad/s], without phase."""
-    edge = cutoff * step / math.pi
-    if edge >= 0.9:
-        return signal
-    result: Array = sosfiltfilt(butter(2, edge, output="sos"), signal)
-    return result
-
-
-def _motion(run: Run, cutoff: float) -> Motion:
-    """The measured motion of ``run`` without what is faster than ``cutoff`` [rad/s]."""
-    step = run.sample_time
-    position = smooth(np.concatenate([[run.start[0]], run.position]), step, cutoff)
-    velocity = np.diff(position) / step
-    return Motion(0.5 * (position[1:] + position[:-1]), velocity, np.gradient(velocity, step), step)

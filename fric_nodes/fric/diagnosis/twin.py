@@ -17,12 +17,12 @@ from ..identification.innovations import Run
 from ..model import Model
 from ..record import Array
 from ..signals.resolution import noise_of, step_of
-from .track import Track, Twin, smooth
+from .motion import SMOOTH, smooth
+from .track import Track, Twin
 from .universe import universe_of
 
 __all__ = ["twins"]
 
-_SMOOTH = 4.0  # times the observer's bandwidth: of the motion that a twin is led along
 _ESCAPED = 10.0  # spans of the recorded motion, beyond which it does not matter how far a twin has run
 _LED = 4.0  # times the observer's bandwidth: of the spring that leads it; with a softer one a model sticks and slips
 # Spring and damper act once per sample: what they may be at most, times m/h^2 and m/h of the body that the sensor sees. That
@@ -36,10 +36,10 @@ def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
     step = run.sample_time
     if model.plant.led:
         motion = track.led_motion[k]
-        force = track.borne(model, k, motion, smooth(run.effort, step, _SMOOTH * track.bandwidth))
+        force = track.borne(model, k, motion, smooth(run.effort, step, SMOOTH * track.bandwidth))
         return motion.position + 0.5 * step * motion.velocity, np.zeros_like(force), force
     position = np.concatenate([[run.start[0]], run.position])
-    wanted = smooth(position, step, _SMOOTH * track.bandwidth)
+    wanted = smooth(position, step, SMOOTH * track.bandwidth)
     rate = np.gradient(wanted, step)
     lead = min(_LED * track.bandwidth, 0.3 / step)
     plant_values = np.array(model.plant_values)
@@ -47,7 +47,7 @@ def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
     stiffness = min(track.mass * lead**2, _STIFFEST * seen / step**2)
     damping = min(2.0 * track.mass * lead, _MOST_DAMPING * seen / step)
     state = np.append(universe.plant.start(plant_values, float(wanted[0]), float(rate[0])), track.begin(k))
-    given = smooth(run.effort, step, _SMOOTH * track.bandwidth)
+    given = smooth(run.effort, step, SMOOTH * track.bandwidth)
     there, extra = np.empty_like(given), np.empty_like(given)
     universe.loops.lead(
         universe.values(model), given,

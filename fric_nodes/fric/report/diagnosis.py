@@ -8,8 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ..diagnosis.limits import EVIDENCE
+from ..diagnosis.motion import smooth
 from ..diagnosis.result import Diagnosis, Finding, Prediction
-from ..diagnosis.track import smooth
 from ..model_file import model_to_text
 from ..record import Array, Record
 from .checks import checks_section

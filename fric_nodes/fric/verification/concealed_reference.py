@@ -14,11 +14,11 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ..diagnosis import diagnose
+from ..diagnosis.motion import smooth
 from ..diagnosis.prove.axis import Setting
 from ..diagnosis.prove.experiment import Bench, draw_recording
 from ..diagnosis.prove.physics import Physics
 from ..diagnosis.result import Diagnosis, Finding, Prediction
-from ..diagnosis.track import smooth
 from ..figure import Figure
 from ..model import Model
 from ..record import Array, Record

@@ -13,8 +13,9 @@ from ...threads import mapped
 from ..along import Along as Quick
 from ..candidates import candidates, place_of, scales_of
 from ..fitting import State
+from ..motion import along
 from ..screen import Column, Promise, columns_of
-from ..track import Track, along
+from ..track import Track
 from .components import BY_ID, COMB, COMPONENTS, OTHER_OF, OTHERS, Along, Component, Ranges, comb_cycles
 from .evidence import Grouped, Weighed
 
