@@ -8,8 +8,8 @@ from fric.diagnosis.along import Along
 from fric.diagnosis.candidates import candidates, scales_of
 from fric.diagnosis.fitting import refit, with_room
 from fric.diagnosis.other_laws import laws_further, strained, told
+from fric.diagnosis.price import FAR_OFF, implausible, mass_off
 from fric.diagnosis.result import listed
-from fric.diagnosis.rivals import FAR_OFF, implausible, mass_off
 from fric.diagnosis.screen import Promise, screen
 from fric.diagnosis.track import Track
 from fric.model import Model, Term, build_model, term

@@ -40,6 +40,7 @@ from .limits import limits_of
 from .locate import Where, locate, moved_back, steady
 from .other_laws import strained
 from .presence import Presence, presences
+from .price import FAR_OFF, implausible, mass_off
 from .result import (
     Diagnosis,
     Estimate,
@@ -53,7 +54,6 @@ from .result import (
     Validation,
     percent,
 )
-from .rivals import FAR_OFF, implausible, mass_off
 from .screen import Tried
 from .settle import FLOOR_KNOWN, Step
 from .start import (

@@ -18,7 +18,9 @@ from .candidates import candidates, scales_of
 from .fitting import NOTHING, State, added, best_track, refit, without_place, without_term
 from .laws import with_best_laws
 from .moves import reconsidered
-from .rivals import BY_CHANCE, OF_EXCESS, PER_PARAMETER, Rival, earns, implausible, rivals_of, worth
+from .price import BY_CHANCE, OF_EXCESS, PER_PARAMETER, earns, implausible, worth
+from .rival import Rival
+from .rivals import rivals_of
 from .screen import Screening, Tried, screen
 from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, audit, exchanged, is_nothing, merged, settled
 from .track import Track

@@ -17,7 +17,7 @@ from ..model import Model, Term
 from .candidates import scales_of
 from .fitting import NOTHING, State, bounds_of, refit, without_term
 from .other_laws import laws_beside, told
-from .rivals import implausible
+from .price import implausible
 from .settle import TO_STAY
 from .track import Track
 

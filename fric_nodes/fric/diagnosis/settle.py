@@ -10,7 +10,10 @@ import numpy as np
 from ..model import Model, Term
 from .candidates import Scales, candidates, scales_of
 from .fitting import State, bounds_of, free_names, refit, without_term
-from .rivals import OF_FLOOR, Rival, implausible, is_stop, name_of, price_of, rivals_of
+from .other_forms import is_stop
+from .price import OF_FLOOR, implausible, price_of
+from .rival import Rival, name_of
+from .rivals import rivals_of
 from .screen import Tried, screen
 from .track import Track, Twin
 from .twin import twins

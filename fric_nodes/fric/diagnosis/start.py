@@ -20,7 +20,7 @@ from ..plants import PLANTS
 from ..record import Record
 from .candidates import scales_of
 from .fitting import bounds_of, free_names
-from .rivals import FAR_OFF, mass_off
+from .price import FAR_OFF, mass_off
 from .track import Track
 
 __all__ = [
