@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fric.diagnosis import Diagnosis, DiagnosisError, diagnose
 from fric.diagnosis.fitting import State, refit
-from fric.diagnosis.grow import Growth, without_nothings
+from fric.diagnosis.growth import Growth, without_nothings
 from fric.diagnosis.held_back import only_there
 from fric.diagnosis.prove import draw
 from fric.diagnosis.prove.cases import make, plan

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fric.diagnosis.at_once import helped
 from fric.diagnosis.fitting import free_names, refit, unseen, without_term
-from fric.diagnosis.grow import Growth, helped
+from fric.diagnosis.growth import Growth
 from fric.diagnosis.track import Track
 from fric.model import Model, build_model, term
 from fric.record import Record

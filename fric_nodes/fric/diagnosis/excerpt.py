@@ -19,7 +19,7 @@ import numpy as np
 from ..model import Model
 from ..record import Array, Index
 from .fitting import free_names, refit
-from .grow import Growth
+from .growth import Growth
 from .track import Track
 
 __all__ = ["MOST", "Excerpt", "confirmed", "excerpt"]
