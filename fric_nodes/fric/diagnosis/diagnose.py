@@ -28,6 +28,7 @@ from ..threads import linear_algebra_in_one
 from .additive.told import by_component
 from .at_once import by_parts, helped, surpassing, together
 from .blocks import one_sided
+from .by_means import concluded_by_means
 from .candidates import FRICTION, Scales, candidates, place_of, scales_of
 from .component import Signature, agreed, signatures
 from .confidence import LITTLE_LEFT, MANY, UNEXPLAINED, confidence_of, is_doubtful, unknown_confidence
@@ -36,7 +37,7 @@ from .fitting import best_track, bounds_of, refit
 from .grow import first_terms, grow, leaves_much, with_moves
 from .growth import Growth, without_nothings
 from .held_back import OnlyThere, only_there
-from .ladder import concluded_by_means, ladder_of
+from .ladder import ladder_of
 from .least_squares import Fit
 from .limits import limits_of
 from .locate import Where, locate, moved_back, steady
