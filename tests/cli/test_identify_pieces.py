@@ -89,7 +89,7 @@ def test_what_needs_the_whole_recording_is_refused(
 def test_a_recording_that_does_not_fit_names_the_option(
     bag: Path, fric: Command, refusal: Refusal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fric.bagio.memory.available", lambda: 50_000_000)  # 200,000 samples take 112 MB
+    monkeypatch.setattr("fric.bagio.memory.available", lambda: 50_000_000)  # 200,000 samples take 128 MB
     line = refusal(fric("identify", bag, "--out", tmp_path / "out"))
     assert "--pieces" in line
-    assert "0.11 GB" in line
+    assert "0.13 GB" in line

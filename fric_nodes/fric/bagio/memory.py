@@ -10,9 +10,9 @@ from .topics import Topics
 
 __all__ = ["available", "needed"]
 
-_COLUMNS = 70
+_COLUMNS = 80
 """Numbers of 8 byte per sample that are in memory at once, from messages to fit, a physical scale: `fric bench long-recordings`
-measures it (memory of pieces of different lengths)."""
+measures it."""
 _PACKED = 100  # numerical: a message takes at least a hundredth of that on the disk, so that a small file need not be opened
 
 

@@ -1,9 +1,10 @@
 """Recordings of hours at 1 kHz, identified in pieces of 10 min: memory, how the time grows, and what is found.
 
 Each recording is written without ever being whole in memory, and identified by the same code as ``fric identify --pieces``, in
-a process of its own whose largest resident memory the system tells. The time is that of reading and fitting, without the start
-of the process. The exponent b of time = c length^b is the slope of the logarithms, with Student's interval of their line.
-A short recording identified as a whole tells what a sample takes then.
+a process of its own whose largest resident memory the system tells. Times are those of reading and fitting, without the start
+of the process. The exponent b of time = c length^b is the slope of the logarithms of the processor's time, which other work on
+the machine hardly changes, with Student's interval of their line. A short recording identified as a whole tells what a
+sample takes then.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def structure(record):
     return to_fit("coulomb,viscous,bias", record.joint, record.units)
 
 path, seconds = Path(sys.argv[1]), float(sys.argv[2])
-start = time.perf_counter()
+start, worked = time.perf_counter(), time.process_time()
 found = {}
 if seconds:
     done = identified_piecewise(
@@ -55,14 +56,14 @@ if seconds:
 else:
     record = read_record(path)
     identified(structure(record), [record], experiments=False)
-found["time"] = time.perf_counter() - start
+found["time"], found["worked"] = time.perf_counter() - start, time.process_time() - worked
 found["memory"] = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 print(json.dumps(found))
 """
 
 
 def identified_apart(path: Path, seconds: float) -> dict[str, Any]:
-    """What a process of its own finds in pieces of so many seconds, or with 0 as a whole; its time [s] and memory [byte]."""
+    """What a process of its own finds in pieces of so many seconds, or with 0 as a whole; its times [s] and memory [byte]."""
     command = [sys.executable, "-c", _CODE, str(path), str(seconds)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=_TIME_LIMIT, check=False)
     if done.returncode:
@@ -92,8 +93,9 @@ def figures(hours: Sequence[float], folder: Path) -> list[Figure]:
     found = {each: _measured(folder, each, _PIECE) for each in hours}
     few, many = (_measured(folder, each, 0.0)["memory"] for each in _WHOLE)
     made = [Figure(f"{each:g} h: time", found[each]["time"], "s") for each in hours]
+    made += [Figure(f"{each:g} h: time of the processor", found[each]["worked"], "s") for each in hours]
     made += [Figure(f"{each:g} h: largest memory", found[each]["memory"] / 1e9, "GB", "<= 2") for each in hours]
-    slope, half = _growth(hours, [found[each]["time"] for each in hours])
+    slope, half = _growth(hours, [found[each]["worked"] for each in hours])
     if math.isfinite(slope):
         # 1 within its interval: the time grows as the length.
         made.append(Figure(f"time grows with this power of the length, +-{half:.2g}", slope, "1"))
