@@ -58,6 +58,14 @@ def test_the_first_turn_does_not_count() -> None:
     assert ratio.value == 2.0
 
 
+def test_what_is_short_is_repeated_until_both_last_as_long() -> None:
+    ours = iter([9.0, 0.5, 0.4, 0.6, 0.5, 0.5, 9.0])
+    ratio, mine, _ = measure([Pair("work", lambda: next(ours), lambda: 2.0, turns=1, even=True)])
+    assert mine.value == pytest.approx(0.5)  # four of them, after one to warm up and one to count by
+    assert ratio.value == pytest.approx(4.0)
+    assert next(ours) == 9.0
+
+
 def _never() -> float:
     raise AssertionError("what is missing is not run")
 

@@ -37,6 +37,7 @@ class Pair:
         needs: name of the module of an optional package that the other way takes; empty: none.
         without: why it can't be measured here; empty when it can.
         warm: a turn before those that count, which compiles and fills caches.
+        even: repeat ours until it lasts as long as theirs, so that other programs interrupt both alike; needs ``warm``.
         beside: figures to stand beside the ratio when all turns are over, such as errors; the pair's name comes before theirs.
     """
 
@@ -48,6 +49,7 @@ class Pair:
     needs: str = ""
     without: str = ""
     warm: bool = True
+    even: bool = False
     beside: Callable[[], list[Figure]] = _nothing
 
     @property
@@ -79,9 +81,7 @@ def measure(pairs: Sequence[Pair], told: Callable[[str], object] = lambda _: Non
         told: takes a line about each round of turns.
     """
     able = [pair for pair in pairs if not pair.missing]
-    for pair in able:
-        if pair.warm:
-            pair.ours(), pair.theirs()
+    repeats = {id(pair): _warmed(pair) for pair in able}
     spent: dict[int, list[tuple[float, float]]] = {id(pair): [] for pair in able}
     rounds = max((pair.turns for pair in able), default=0)
     for k in range(rounds):
@@ -89,16 +89,23 @@ def measure(pairs: Sequence[Pair], told: Callable[[str], object] = lambda _: Non
         for pair in able:
             # A pair with few turns has them spread evenly over the rounds.
             if (k + 1) * pair.turns // rounds > k * pair.turns // rounds:
-                spent[id(pair)].append(_turn(pair, ours_first=k % 2 == 0))
+                spent[id(pair)].append(_turn(pair, repeats[id(pair)], ours_first=k % 2 == 0))
     return [figure for pair in pairs for figure in _figures(pair, spent.get(id(pair), []))]
 
 
-def _turn(pair: Pair, ours_first: bool) -> tuple[float, float]:
-    if ours_first:
-        ours = pair.ours()
-        return ours, pair.theirs()
+def _warmed(pair: Pair) -> int:
+    """How often ours is done in each turn, after the turn that doesn't count."""
+    if not pair.warm:
+        return 1
+    pair.ours()
     theirs = pair.theirs()
-    return pair.ours(), theirs
+    return max(1, round(theirs / pair.ours())) if pair.even else 1
+
+
+def _turn(pair: Pair, repeats: int, ours_first: bool) -> tuple[float, float]:
+    theirs = math.nan if ours_first else pair.theirs()
+    ours = sum(pair.ours() for _ in range(repeats)) / repeats
+    return ours, pair.theirs() if ours_first else theirs
 
 
 def _figures(pair: Pair, spent: Sequence[tuple[float, float]]) -> list[Figure]:

@@ -96,7 +96,7 @@ def prepare(folder: Path) -> Sequence[Pair]:
             return spent
 
         title = f"loading {2 * _N_SAMPLES:,} messages ({storage}), against {name}"
-        pairs.append(Pair(title, mine, theirs, ">= 10", _TURNS, needs))
+        pairs.append(Pair(title, mine, theirs, ">= 10", _TURNS, needs, even=True))
     return pairs
 
 

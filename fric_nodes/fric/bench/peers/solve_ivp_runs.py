@@ -36,7 +36,6 @@ _STIFFNESS, _DAMPING = 1e5, 100.0
 _LADDER = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # relative tolerances; the absolute one is a thousandth of it [m, m/s]
 _FINE = 1e-11
 _TURNS = 9
-_RUNS = 10  # of fric in one turn, since one takes less than a millisecond
 
 _Run = Callable[[str, float], Array]
 
@@ -144,9 +143,10 @@ def _pair(name: str, model: Model, other: _Run, methods: Sequence[str], fine: st
 
     return Pair(
         f"simulation of {_STEP * (_N - 1):g} s against solve_ivp, {name}",
-        lambda: _timed(lambda: [simulate(model, effort, _STEP) for _ in range(_RUNS)]) / _RUNS,
+        lambda: _timed(lambda: simulate(model, effort, _STEP)),
         functools.partial(_timed, functools.partial(other, method, tolerance)),
         turns=_TURNS,
+        even=True,
         beside=beside,
     )
 
