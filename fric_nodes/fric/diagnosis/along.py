@@ -18,9 +18,10 @@ from ..record import Array
 from .least_squares import Bounds, fitted_values
 from .track import Track
 
-__all__ = ["Along"]
+__all__ = ["REST", "Along"]
 
-_REST = 0.01  # of the fast speed, below which the body may rest
+REST = 0.01
+"""Physical: share of the fast speed of the axis below which it may rest."""
 _ITERATIONS = 5
 _STRIDE = 0.4  # times 1/w
 
@@ -41,7 +42,7 @@ class Along:
         slowest = min((run.sample_time for run in track.runs), default=1.0)
         self.stride = max(int(_STRIDE / (track.bandwidth * slowest)), 1)
         speed = np.abs(np.concatenate([each.velocity for each in track.motion]))
-        rest = max(_REST * float(np.quantile(speed, 0.98)), 4.0 * max(track.noise) * track.bandwidth)
+        rest = max(REST * float(np.quantile(speed, 0.98)), 4.0 * max(track.noise) * track.bandwidth)
         self.moving = track.joined([(np.abs(each.velocity) > rest).astype(np.float64) for each in track.motion]) > 0.5
 
     @property

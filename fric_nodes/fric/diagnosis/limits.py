@@ -21,7 +21,7 @@ from ..effect import Effect
 from ..effects import EFFECTS
 from ..model import ModelError, Term
 from ..record import Array, Units
-from .additive.residual import independent_values
+from .additive.residual import OWN, independent_values
 from .fitting import State
 from .screen import Column, Tried
 from .track import Track
@@ -31,7 +31,6 @@ __all__ = ["EVIDENCE", "Limit", "limits_of"]
 EVIDENCE = 10.0
 """Statistical [nats]: what a term must gain on unseen blocks to be more than chance among some hundred trials."""
 
-_OWN = 0.02  # statistical, of a column's energy: with less left, the fitted parameters are the effect by other names
 _NEAR = 1.3  # numerical: so near to the limit the change is about proportional to the size
 _STEP = 30.0  # numerical: of one step towards the limit
 _ROUNDS = 8  # numerical
@@ -111,7 +110,7 @@ class _Search:
     def needed(self, column: Array) -> float | None:
         """By what a column has to be multiplied; None where the fitted parameters do the same."""
         own = self.own(column)
-        return None if own <= max(_OWN * float(column @ column), _TINY) else math.sqrt(self.energy / own)
+        return None if own <= max(OWN * float(column @ column), _TINY) else math.sqrt(self.energy / own)
 
     def own(self, column: Array) -> float:
         """Energy of what the fitted parameters can't do of a column [F^2]."""

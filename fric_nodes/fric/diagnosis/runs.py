@@ -14,13 +14,13 @@ from typing import Self
 
 import numpy as np
 
-from ..identification.innovations import Run, runs_of
+from ..identification.innovations import SHORTEST, Run, runs_of
 from ..model import Model
 from ..record import Array, Index, Record
 from ..signals.resolution import noise_of, step_of
 from .motion import SMOOTH, Motion, Past, motion_of
 
-__all__ = ["SMOOTH_LED", "Runs"]
+__all__ = ["SETTLING", "SMOOTH_LED", "Runs"]
 
 SMOOTH_LED = 2.0
 """Numerical, times the observer's bandwidth [rad/s]: cutoff of the motion that leads a contact.
@@ -28,10 +28,10 @@ SMOOTH_LED = 2.0
 It is lower than ``SMOOTH``, so that less of the encoder's noise comes through.
 """
 _UNSURE = 0.2  # of the variance of noise
-_SETTLING = 6.0  # time constants of the observer that are dropped at the start of each run
+SETTLING = 6.0
+"""Numerical, time constants of the observer that are dropped at the start of each run."""
 _OVER = 0.3  # [s] after which it doesn't matter where in its gap a body began, how its spring was bent or a command had come
 _FORGOTTEN = 3.0  # [s] the same for what friction remembers, and for what rings on the body
-_SHORTEST = 200  # samples of a run
 _FEWEST = 50  # intervals of a past that tells anything
 _SHAKEN = 0.4  # steps of the encoder that count as its noise
 
@@ -77,7 +77,7 @@ class Runs:
         for k, record in enumerate(records):
             found = runs_of(record, late)
             bounds = np.flatnonzero(np.diff(np.concatenate([[False], record.mask, [False]]).astype(np.int8)))
-            starts = [int(first) for first, last in zip(bounds[::2], bounds[1::2], strict=True) if last - first >= _SHORTEST]
+            starts = [int(first) for first, last in zip(bounds[::2], bounds[1::2], strict=True) if last - first >= SHORTEST]
             for run, first in zip(found, starts, strict=True):
                 runs.append(run)
                 time.append(record.time[first] + np.cumsum(run.step))
@@ -163,7 +163,7 @@ class Runs:
 
     def settled(self, k: int) -> int:
         """Intervals until the observer has settled in run ``k``."""
-        return max(math.ceil(_SETTLING / (self.bandwidth * self.runs[k].sample_time)), 20)
+        return max(math.ceil(SETTLING / (self.bandwidth * self.runs[k].sample_time)), 20)
 
     def joined(self, of_run: Sequence[Array]) -> Array:
         """Signals with one value per interval of each run, without the settling, joined, shape ``(n,)``."""

@@ -27,7 +27,19 @@ from .fine import fine_periods
 from .least_squares import Fit
 from .track import Track
 
-__all__ = ["Column", "Gram", "Promise", "Screening", "Tried", "blocks_of", "columns_of", "restraint", "screen"]
+__all__ = [
+    "SEEN",
+    "SLOWLY",
+    "Column",
+    "Gram",
+    "Promise",
+    "Screening",
+    "Tried",
+    "blocks_of",
+    "columns_of",
+    "restraint",
+    "screen",
+]
 
 _BLOCKS = 10
 _KEPT = 2  # trials of a candidate that go from the quick columns to the observer's
@@ -35,8 +47,10 @@ _TINY = 1e-10
 _VISIBLE = 1e-12  # of what is missing, the least that a trial changes
 _OWN = 0.02  # of a column, what the fit's own parameters must not be able to do
 _PAIRS = 5
-_SEEN = 1.5  # times its bandwidth: faster ones an observer hardly sees
-_SLOWLY = 0.25  # of the motion
+SEEN = 1.5
+"""Numerical, times the observer's bandwidth: forces with a higher frequency hardly come through."""
+SLOWLY = 0.25
+"""Statistical: quantile of the speed that counts as slow motion, where a force over the position has its lowest frequencies."""
 _AT_ONCE = 400  # sets of columns whose equations are solved together
 
 
@@ -185,7 +199,7 @@ class Promise:
         position, velocity = (self._along.seen(name)[self._rows] for name in ("position", "velocity"))
         travel, finest = float(np.ptp(position)), min(trial.values[at] for trial in candidate.trials)
         # Slowly moved over, it comes more slowly, and the observer sees it.
-        seen = _SEEN * self._along.bandwidth / (2.0 * np.pi * float(np.quantile(np.abs(velocity), _SLOWLY)))
+        seen = SEEN * self._along.bandwidth / (2.0 * np.pi * float(np.quantile(np.abs(velocity), SLOWLY)))
         missing = self._missing * np.sign(velocity) if candidate.effect.level is not None else self._missing
         periods = fine_periods(position, missing, travel / finest, seen * travel)
         given = candidate.trials[0].values

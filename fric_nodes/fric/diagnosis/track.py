@@ -44,11 +44,12 @@ from .motion import Motion, along, motion_of
 from .runs import SMOOTH_LED, Runs
 from .universe import universe_of
 
-__all__ = ["Track", "Twin"]
+__all__ = ["STEP_OF_RATE", "Track", "Twin"]
 
 _SMEARED = 3.0  # time constants of that, over which it smears a turn
 _NEXT_TO_NOTHING = 1e-12  # [x/s], a speed that only has a sign
-_STEP_OF_RATE = 0.2
+STEP_OF_RATE = 0.2
+"""Numerical: the longest step of a simulation, times the fastest rate of the model."""
 _MOST_STEPS = 4  # per sample: the step is implicit, and what is faster than the observer changes nothing that it sees
 _STEP_OF_OBSERVER = 0.4  # of the observer's time constant: shorter ones it can't tell from this
 _MOST_GAIN = 2.5  # times gain and 2 alpha + beta; at 4 the pursuit of a mass begins to swing
@@ -207,7 +208,7 @@ class Track(Runs):
         (400 rad/s, 2 ms) instead of sixteen change what is missing by less than a thousandth of the floor.
         """
         most = min(math.ceil(self.bandwidth * run.sample_time / _STEP_OF_OBSERVER), _MOST_STEPS)
-        return min(substeps(model, run.sample_time, _STEP_OF_RATE), most)
+        return min(substeps(model, run.sample_time, STEP_OF_RATE), most)
 
     def seen(self, of_run: Sequence[Array]) -> Array:
         """The residual that a missing force per interval would give [F]: low-passed and joined, shape ``(n,)``."""

@@ -25,14 +25,14 @@ from ..model import Model
 from ..record import Array, Record
 from ..signals.resolution import noise_of, step_of
 from ..simulation import substeps
+from .runs import SETTLING
+from .track import STEP_OF_RATE
 
 __all__ = ["BANDWIDTHS", "Phase", "Watch", "WatchSettings"]
 
 BANDWIDTHS = (25.0, 140.0)
 """Of the observers [rad/s]."""
 _FAST = 1.0  # largest product of bandwidth and sample time
-_STEP_OF_RATE = 0.2
-_SETTLING = 6.0  # time constants of the observer
 _CHANGING = 10.0  # the same: when a change began is not known better
 _BLOCK = 0.1  # [s]
 _MEASURING = 1.0  # [s] from which step and noise are known before anything is followed
@@ -88,9 +88,9 @@ class Follower:
         self._model = model
         self._gains = 1.0 - z * z, (1.0 - z) ** 2
         self._scale = model.total_inertia * self._gains[1] / step**2
-        self._substeps = min(substeps(model, step, _STEP_OF_RATE), 60)
+        self._substeps = min(substeps(model, step, STEP_OF_RATE), 60)
         self._values, self._plant_values = model.values, np.array(model.plant_values)
-        self.settling = math.ceil(_SETTLING / bandwidth / _BLOCK) + 1
+        self.settling = math.ceil(SETTLING / bandwidth / _BLOCK) + 1
         self.bandwidth = bandwidth
 
     def restart(self, position: float, velocity: float) -> None:

@@ -25,10 +25,13 @@ from ..signals.resolution import noise_of
 from ..simulation import intervals
 from .equations import surroundings
 
-__all__ = ["SETTLING", "Run", "excerpt", "gains", "innovations", "runs_of"]
+__all__ = ["SETTLING", "SHORTEST", "Run", "excerpt", "gains", "innovations", "runs_of"]
 
 SETTLING = 20
 """Innovations dropped at the start of each run."""
+
+SHORTEST = 10 * SETTLING
+"""Numerical: samples of the shortest run, of which a tenth at most is dropped."""
 _DIFFERENCES = 6  # which no smooth force survives
 _AROUND = 9  # of them
 _APART = 0.5  # of the usual step: samples that are no closer
@@ -114,7 +117,7 @@ def runs_of(record: Record, late: float | None = None) -> list[Run]:
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], record.mask, [False]]).astype(np.int8)))
     found = []
     for first, last in zip(bounds[::2].tolist(), bounds[1::2].tolist(), strict=True):
-        if last - first < 10 * SETTLING:
+        if last - first < SHORTEST:
             continue
         position = record.position[first:last]
         step = np.diff(record.time[first:last])
@@ -176,7 +179,7 @@ def excerpt(runs: Sequence[Run], most: int) -> list[Run]:
     for run in runs:
         n = run.effort.shape[0]
         length = int(share * n / 3)
-        if length < 10 * SETTLING:
+        if length < SHORTEST:
             parts.append(run)
             continue
         parts += [run.part(first, first + length) for first in (0, (n - length) // 2, n - length)]

@@ -10,11 +10,12 @@ import numpy as np
 from ...model import Term
 from ...record import Array
 from ...threads import mapped
+from ..along import REST
 from ..along import Along as Quick
 from ..candidates import candidates, place_of, scales_of
 from ..fitting import State
 from ..motion import along
-from ..screen import Column, Promise, columns_of
+from ..screen import SEEN, SLOWLY, Column, Promise, columns_of
 from ..track import Track
 from .components import BY_ID, COMB, COMPONENTS, OTHER_OF, OTHERS, Along, Component, Ranges, comb_cycles
 from .evidence import Grouped, Weighed
@@ -40,12 +41,9 @@ ALIKE = 0.5
 OWN = 0.02
 """Statistical, share of a law's energy that all other parameters leave: with less, it is them by another name."""
 
-_REST = 0.01  # of the fast speed, below which the axis may rest
 _THIN = 1.0  # times 1/w, from row to row: what an observer sees is smooth over about two of these
 _ROUNDS = 15  # iterations from the sizes that hold with all components
 _PRIOR = 0.1  # probability, before the recording is seen, that something is missing in a component
-_SEEN = 1.5  # times the bandwidth: forces that come faster are hardly seen
-_SLOWLY = 0.25  # quantile of the speed
 _STRONGEST = 3  # periods that are tried
 
 
@@ -248,7 +246,7 @@ def independent_values(track: Track, residual: Array) -> float:
 def _signals(track: Track, state: State) -> list[Along]:
     model = state.fit.model
     fast = max(float(np.quantile(np.abs(np.concatenate([each.velocity for each in track.motion])), 0.98)), 1e-300)
-    rest = max(_REST * fast, 4.0 * max(track.noise) * track.bandwidth)
+    rest = max(REST * fast, 4.0 * max(track.noise) * track.bandwidth)
     found = []
     for k, (run, time, motion) in enumerate(zip(track.runs, track.time, track.motion, strict=True)):
         n = motion.velocity.shape[0]
@@ -283,7 +281,7 @@ def _ranges(track: Track, signals: Sequence[Along]) -> Ranges:
     scales = scales_of(track)
     position, velocity = (np.concatenate([getattr(each, name) for each in signals]) for name in ("position", "velocity"))
     slowly = (
-        float(np.quantile(np.abs(velocity[np.abs(velocity) > scales.slow]), _SLOWLY))
+        float(np.quantile(np.abs(velocity[np.abs(velocity) > scales.slow]), SLOWLY))
         if np.any(np.abs(velocity) > scales.slow)
         else scales.slow
     )
@@ -293,6 +291,6 @@ def _ranges(track: Track, signals: Sequence[Along]) -> Ranges:
         float(np.quantile(np.abs(velocity), 0.999)),
         min(float(each.time[0]) for each in signals),
         max(float(each.time[-1]) for each in signals),
-        max(2.0 * np.pi * slowly / (_SEEN * track.bandwidth), 4.0 * scales.grain),
+        max(2.0 * np.pi * slowly / (SEEN * track.bandwidth), 4.0 * scales.grain),
         scales.grain,
     )
