@@ -11,11 +11,11 @@ is the mean force that the link gives for the deflections e_0 and e_1 that it le
 
     L = link(e_0, e_1(L), h).
 
-The more it pulls, the less the motor gets ahead, so e_1 falls with L, and L - link(...) rises with a slope of 1 at least: there
-is one root, and it lies between any trial and that trial less its excess. As e_1 is nearly a straight line over L, the link is
-solved along that line, and the line is drawn anew through what the bodies did: two trials where no friction lets go or holds. As one force leads both bodies, no momentum is lost but to rounding, and as its work on both is
-L (e_1 - e_0), the energy of an undamped link is kept as well as the root is found, whatever the step and whatever sticks or
-stops.
+The more it pulls, the less the motor gets ahead, so e_1 falls with L, and L - link(...) rises with a slope of 1 at least:
+there is one root, and it lies between any trial and that trial less its excess. As e_1 is nearly a straight line over L, the
+link is solved along that line, and the line is drawn anew through what the bodies did: two trials where no friction lets go or
+holds. As one force leads both bodies, no momentum is lost but to rounding, and as its work on both is L (e_1 - e_0), the energy
+of an undamped link is kept as well as the root is found, whatever the step and whatever sticks or stops.
 
 Rigid transmission: no term of the model gives a force. Within the play both bodies move for themselves. Where they meet they
 go on with their common velocity (m_m dy/dt + m_l dq/dt)/(m_m + m_l), a fully plastic impact at the time within the step at

@@ -55,7 +55,7 @@ class Design:
         ),
     ] = ()
     tries: Annotated[
-        int, typer.Option("--tries", help="Settings of each excitation that are tried first; more take longer.")
+        int, typer.Option("--tries", help="How many settings of each excitation the first search tries; more take longer.")
     ] = 6
 
 
