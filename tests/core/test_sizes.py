@@ -15,11 +15,6 @@ LINES_OF_A_NODE = 150
 COMPILED = {"compiled", "compiled_loop", "kernel", "loop", "njit"}
 """Decorators of :mod:`fric.engine.kernel` and numba: what they compile is one piece, since a call would cost time."""
 
-EXEMPT: dict[str, str] = {
-    "fric_nodes/fric/diagnosis/diagnose.py": "holds the verdict and its whole sequence of steps; it is still to be split",
-}
-"""Folders and files that are over the limits for now, each with its reason; one that no longer is has to go from here."""
-
 
 def files() -> list[Path]:
     folders = ("fric_nodes", "fric_interfaces", "tests", "docs")
@@ -49,22 +44,9 @@ def too_long(path: Path) -> Iterator[str]:
                 yield f"{name}:{node.lineno} {node.name}: {length} lines, at most {LINES_OF_A_FUNCTION}"
 
 
-def reason(path: Path) -> str | None:
-    """Under which entry of :data:`EXEMPT` a file falls."""
-    name = path.relative_to(ROOT).as_posix()
-    return next((entry for entry in EXEMPT if name == entry or name.startswith(f"{entry}/")), None)
-
-
 def test_files_and_functions_are_short() -> None:
-    found = [line for path in files() if reason(path) is None for line in too_long(path)]
+    found = [line for path in files() for line in too_long(path)]
     assert not found, "\n".join(found)
-
-
-@pytest.mark.parametrize("entry", EXEMPT)
-def test_every_exemption_is_needed(entry: str) -> None:
-    assert any(True for path in files() if reason(path) == entry for _ in too_long(path)), (
-        f"{entry} needs no exemption any more"
-    )
 
 
 def test_a_long_function_and_a_long_file_are_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from dataclasses import replace
 
+import fric
 import numpy as np
 import pytest
 from fric.diagnosis import Diagnosis, DiagnosisError, diagnose
@@ -280,7 +282,25 @@ def test_predictions_are_of_the_validation_recording(presliding: tuple[object, D
     assert np.corrcoef(p.force_measured, measured)[0, 1] > 0.97
     error = p.force_measured - p.force_refit
     spread = p.force_measured - np.mean(p.force_measured)
-    assert 100.0 * error @ error / (spread @ spread) == pytest.approx(found.validation.noe_refit, rel=1e-6)
+    assert 100.0 * error @ error / (spread @ spread) == pytest.approx(found.validation.noe_refit, rel=0.01)
+
+
+def test_a_prediction_repeats_nothing_of_the_recorded_force() -> None:
+    """Noise of the recorded force, as much as two thirds of its friction, is nowhere in what the model predicts."""
+    predictions = sys.modules["fric.diagnosis.judging"].predictions_of
+    axis = build_model("rigid", {"mass": 5.0}, [term("coulomb", force=8.0), term("viscous", coefficient=30.0)])
+    t = 2e-3 * np.arange(4000)
+    moved = fric.simulate(axis, 30.0 * np.sin(2.0 * np.pi * (0.3 + 0.06 * t) * t), period=2e-3)
+    noise = 5.0 * np.random.default_rng(3).standard_normal(t.shape[0])
+    clean, noisy = (
+        predictions([record], held, {name: held.residual(axis) for name in ("nominal", "refit", "augmented")})[0]
+        for record in (moved, replace(moved, effort=moved.effort + noise))
+        for held in (Track.of([record], 140.0, axis),)
+    )
+    added = noisy.force_measured - clean.force_measured
+    assert np.std(added) > 0.5
+    # Nearly: beside a damping of 6 rad/s an observer of 140 rad/s sees a force a little later than beside a mass alone.
+    assert np.median(np.abs(noisy.force_augmented - clean.force_augmented)) < 0.2 * np.median(np.abs(added))
 
 
 def test_the_page_is_whole(presliding: tuple[object, Diagnosis]) -> None:

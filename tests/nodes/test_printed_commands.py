@@ -68,8 +68,7 @@ _ON_FILES = {"diagnose", "import", "identify", "compare", "simulate"}  # verbs t
 
 def _is_name(command: str) -> bool:
     """True when it names a verb, or options of one, without what it works on; or holds a placeholder."""
-    words = command.split()
-    if words[0] != "fric":
+    if not (words := command.split()) or words[0] != "fric":
         return False
     if words[-1] in {"…", "NAME", "--help"} or command in {"fric verify", "fric prove"}:
         return True
@@ -281,6 +280,7 @@ KNOWN: dict[str, Case] = {
     **{
         f"fric {name}": _JUDGED
         for name in (
+            *(f"prove {each}" for each in ("--variant mixed --out mixed", "--calibrate proof --calibrate mixed --out learnt")),
             *(f"prove --cases {each} --out proof" for each in ("300 --seed 110", "100 --seed 20261126")),
             *("prove --inject bags/slide --model config/nominal_model.yaml --out proof", "bench long-recordings"),
             *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),

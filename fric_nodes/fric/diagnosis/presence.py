@@ -2,13 +2,13 @@
 
 The grown model is fitted to one half of the recordings with a term and without it, everything else fitted anew, and both are
 judged on the other half; and the other way round. What is there takes its part off either half. So the smaller of the two
-differences counts, as the logarithm of a likelihood ratio of so many values as what stays unexplained leaves independent:
-the more stays, and the longer it hangs together, the less sure is anything beside it. A rival fitted in full shares the
-probability by Bayes' rule. And what nothing explains may show as any law: its share of what is missing counts against each.
+differences counts, as the logarithm of a likelihood ratio of so many values as what stays unexplained leaves independent.
+A rival fitted in full shares the probability by Bayes' rule.
 
 What belongs to no law may be mended by the same wrong law in either half. So a law has to be asked for, too, where flexible
 functions of all other components of the machine are there (:mod:`.additive.asked`): what these explain as well is no evidence
-for it.
+for it. How sure all this makes an effect was learnt from examinations (:mod:`.calibration`): physics outside the vocabulary
+imitates some laws with much evidence, and likelihoods alone would be too sure.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ from numpy.typing import NDArray
 from ..model import Model
 from .additive.asked import Asked
 from .additive.residual import independent_values
+from .calibration import Evidence, calibration
 from .candidates import scales_of
+from .confidence import margin_of
 from .fitting import bounds_of, free_names, refit, without_term
 from .settle import Step
 from .track import Track
@@ -32,9 +34,6 @@ __all__ = ["Half", "Presence", "presences"]
 
 _A_LITTLE = 0.1  # of a residual of the half that is judged on: it says what the other one tells hardly at all
 _ITERATIONS = 6
-_EVEN = 3.0  # statistical, nats: odds of twenty to one weigh up that one effect among twenty is there
-_STEEP = 1.5  # statistical, nats: by so much what is missing differs from the noise that the likelihood supposes
-_MOST = 0.6  # statistical: of what came out surer beside physics outside the vocabulary, at least as much was wrong (seed 4711)
 
 
 @dataclass(frozen=True)
@@ -57,19 +56,24 @@ class Presence:
     Attributes:
         probability: that it is, and not one of its rivals.
         halves: each by itself.
+        evidence: that the probability follows from.
     """
 
     probability: float
     halves: tuple[Half, Half]
+    evidence: Evidence
 
 
-def presences(track: Track, end: Model, steps: Sequence[Step], unexplained: float) -> dict[str, Presence]:
+def presences(
+    track: Track, end: Model, steps: Sequence[Step], shares: Mapping[str, float], unexplained: float
+) -> dict[str, Presence]:
     """How sure each term of the grown model ``end`` is there, by the name of the term.
 
     Args:
         track: the recordings learnt from.
         end: the grown model, fitted.
         steps: by which its terms came.
+        shares: of what is missing that each of them explains, by the name of the term.
         unexplained: share of what is missing that it leaves, 0 to 1.
     """
     left = track.residual(end)
@@ -78,7 +82,9 @@ def presences(track: Track, end: Model, steps: Sequence[Step], unexplained: floa
     first = (np.arange(n) * 4 // n) % 2 == 0
     with_all = [_on_other(track, end, rows) for rows in (first, ~first)]
     found: dict[str, Presence] = {}
-    asked = Asked(track, refit(track, end, _ITERATIONS)) if steps else None
+    if not steps:
+        return {}
+    asked = Asked(track, refit(track, end, _ITERATIONS))
     places = list(end.prefixes)
     for step in steps:
         without = without_term(end, step.term.split("#")[0])
@@ -88,19 +94,11 @@ def presences(track: Track, end: Model, steps: Sequence[Step], unexplained: floa
             own = {p.name: p.value for p in fitted.parameters() if p.name.startswith(f"{step.term}.")}
             halves.append(Half(nats, own))
         least = min(each.nats for each in halves)
-        sure = min(
-            _probability(least) * _among_rivals(step, independent),
-            1.0 if asked is None else _probability(asked.nats(places.index(step.term))),
-            _MOST,
-        )
-        sure *= 1.0 - unexplained
-        found[step.term] = Presence(round(sure, 4), (halves[0], halves[1]))
+        functions = asked.nats(places.index(step.term))
+        evidence = Evidence(margin_of(step), shares[step.term], unexplained, least, functions, _among_rivals(step, independent))
+        sure = calibration().probability(step.term.split("#")[0], evidence)
+        found[step.term] = Presence(round(sure, 4), (halves[0], halves[1]), evidence)
     return found
-
-
-def _probability(nats: float) -> float:
-    """That an effect is there, from the logarithm of its likelihood ratio."""
-    return 1.0 / (1.0 + math.exp(-min(max((nats - _EVEN) / _STEEP, -50.0), 50.0)))
 
 
 def _on_other(track: Track, model: Model, rows: NDArray[np.bool_]) -> tuple[Model, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -13,25 +13,16 @@ from ..instrument import Finding as Check
 from ..model import Model
 from ..record import Array
 from .additive.told import ComponentFinding
+from .calibration import Evidence
 from .confidence import AS_LIKELY, FAINT
 from .limits import Limit
 from .locate import Where
 from .presence import Half
 
 __all__ = [
-    "Diagnosis",
-    "Estimate",
-    "Finding",
-    "Grown",
-    "NominalPart",
-    "Prediction",
-    "Rejected",
-    "RunnerUp",
-    "Unexplained",
-    "Validation",
-    "listed",
-    "percent",
-]
+    "Diagnosis", "Estimate", "Finding", "Grown", "NominalPart", "Prediction", "Rejected", "RunnerUp", "Unexplained",
+    "Validation", "listed", "percent",
+]  # fmt: skip
 
 FORMAT = "fric-report/1"
 
@@ -73,6 +64,7 @@ class Finding:
         noe_before: NOE of the refitted nominal model on unseen recordings [%].
         noe_after: NOE of the grown model on them [%].
         reproduced: what each half of the recordings says of it by itself; empty where that wasn't asked.
+        weighed: what speaks for it; None of something unknown.
     """
 
     effect: str
@@ -88,6 +80,7 @@ class Finding:
     noe_before: float
     noe_after: float
     reproduced: tuple[Half, ...] = ()
+    weighed: Evidence | None = None
 
 
 @dataclass(frozen=True)
@@ -148,7 +141,7 @@ class Unexplained:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Forces of one validation recording, arrays of shape ``(n,)`` [F] over ``time`` [s]."""
+    """Forces of one validation recording, ``(n,)`` each [F], over ``time`` [s], low-passed as the observer sees them."""
 
     source: str
     time: Array
@@ -387,6 +380,7 @@ def _finding(each: Finding) -> dict[str, Any]:
         "noe_before": each.noe_before,
         "noe_after": each.noe_after,
         "reproduced": [{"nats": half.nats, "parameters": dict(half.parameters)} for half in each.reproduced],
+        "weighed": None if each.weighed is None else asdict(each.weighed),
     }
 
 

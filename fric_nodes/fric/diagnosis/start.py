@@ -57,7 +57,7 @@ class DiagnosisError(InputError):
 
 def spread_of(track: Track) -> float:
     """Sum of squares of the recorded force about its mean [F^2]."""
-    effort = track.joined([run.effort for run in track.runs])
+    effort = track.seen([run.effort for run in track.runs])
     return float(np.sum((effort - np.mean(effort)) ** 2))
 
 

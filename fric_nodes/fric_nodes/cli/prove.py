@@ -46,9 +46,19 @@ def prove(
         str, typer.Option("--sizes", help="With --inject: sizes, as multiples of the force that stays unexplained.")
     ] = "3,6",
     only: Annotated[str, typer.Option("--only", help="With --inject: effects, separated by commas. If not given: all.")] = "",
+    calibrate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--calibrate",
+            help="Learn how sure effects are from this examination. May be repeated.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Measure how often the diagnosis is right; exit status 1 when a goal is missed. A stopped run continues in its folder."""
+    if calibrate:
+        _calibrate(calibrate, out)
+        return
     if inject or model is not None:
         _inject(inject or [], model, sizes, only, out, as_json)
         return
@@ -101,6 +111,18 @@ def _examine(cases: int, seed: int, variant: str, jobs: int | None, out: Path, a
         typer.echo(f"written: {out / 'index.html'}")
     if held.score.missed:
         raise typer.Exit(1)
+
+
+def _calibrate(examinations: list[Path], out: Path) -> None:
+    """The map from evidence to probability; ``calibration.json`` goes into ``out``."""
+    from fric.diagnosis.prove.calibrating import learnt
+    from fric.files import write_text
+
+    content = learnt(examinations)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / "calibration.json", json.dumps(content, indent=1) + "\n")
+    typer.echo(f"{content['findings']} findings beside something unknown, {content['right']} of them right")
+    typer.echo(f"written: {out / 'calibration.json'}")
 
 
 _BLOCKS = 10

@@ -1,0 +1,86 @@
+"""From what speaks for an effect beside something unknown to the probability that it is there: a map learnt from examinations.
+
+The logarithm of the odds is a weighted sum of a few measures of evidence (:class:`Evidence`) and of one number per effect:
+unknown physics looks like some effects more often than like others. No weight is negative, so that more evidence never counts
+for less. The weights are in ``calibration.json``, with the examinations that they were learnt from; ``fric prove --calibrate``
+makes that file (:mod:`.prove.calibrating`).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+__all__ = ["FORMAT", "Calibration", "Evidence", "calibration", "measures_of"]
+
+FORMAT = "fric-calibration/1"
+_LEAST = 1e-3  # numerical: of a share, whose logarithm is taken
+_SURE = 12.0  # numerical: logarithm of odds, beyond which nothing is surer
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for one effect.
+
+    Attributes:
+        margin: logarithm of what the best rival leaves over what the effect leaves, the price of parameters included.
+        share: of what is missing that the effect explains, 0 to 1.
+        rest: share of what is missing that stays unexplained, 0 to 1.
+        halves: how likely each half of the recordings makes it, judged on the other one; the smaller of both [nats].
+        functions: evidence for it where flexible functions of all other components are there [nats].
+        rivals: probability of the effect among itself and what was fitted in its place.
+    """
+
+    margin: float
+    share: float
+    rest: float
+    halves: float
+    functions: float = math.inf
+    rivals: float = 1.0
+
+
+def measures_of(evidence: Evidence) -> dict[str, float]:
+    """The measures that enter the odds, by name; each counts for the effect, the more the larger it is.
+
+    Of halves and functions the one that says less counts: an effect has to be asked for by both.
+    """
+    share = math.log(min(max(evidence.share, _LEAST), 1.0))
+    rest = min(max(evidence.rest, _LEAST), 1.0)
+    return {
+        "share": share,
+        "explained": math.log(max(1.0 - rest, _LEAST)),
+        "share over rest": share - math.log(rest),
+        "weakest": math.log1p(max(min(evidence.halves, evidence.functions), 0.0)),
+    }
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The weights.
+
+    Attributes:
+        offset: logarithm of the odds without evidence.
+        weights: of each measure.
+        effects: what is added for an effect; 0 for one that isn't there.
+    """
+
+    offset: float
+    weights: Mapping[str, float]
+    effects: Mapping[str, float]
+
+    def probability(self, effect: str, evidence: Evidence) -> float:
+        """That the effect with the id ``effect`` is there and none of its rivals, 0 to 1."""
+        odds = self.offset + self.effects.get(effect, 0.0)
+        odds += sum(self.weights[name] * value for name, value in measures_of(evidence).items())
+        return evidence.rivals / (1.0 + math.exp(-min(max(odds, -_SURE), _SURE)))
+
+
+@lru_cache(maxsize=1)
+def calibration() -> Calibration:
+    """The map that this version was published with."""
+    content = json.loads(Path(__file__).with_name("calibration.json").read_text(encoding="utf-8"))
+    return Calibration(content["offset"], content["weights"], content["effects"])

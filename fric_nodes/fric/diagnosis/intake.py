@@ -1,0 +1,106 @@
+"""What a diagnosis takes in: recordings that are of use, without the faults that can be taken out of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..instrument import Correction, inspect
+from ..instrument import Finding as Check
+from ..model import Model
+from ..record import Array, Record
+from ..signals.resolution import noise_of
+from .start import (
+    DiagnosisError,
+)
+
+__all__ = ["of_use", "refuse", "without_faults"]
+
+_STILL = 12.0  # times the noise of a position, that hardly any sample of an hour is off by to either side
+_FLICKERS = 3  # values
+
+
+def refuse(train: Sequence[Record], validation: Sequence[Record]) -> None:
+    """Refuse to go on without recordings of either kind, or with one that is learnt from and held back.
+
+    Raises:
+        DiagnosisError: that is so.
+    """
+    if not train or not validation:
+        raise DiagnosisError("diagnose", "needs recordings to learn from and one held back", "give TRAIN and --validate")
+    for held in validation:
+        for other in train:
+            same = held.n_samples == other.n_samples and np.array_equal(held.position, other.position)
+            if same and np.array_equal(held.effort, other.effort) and np.any(held.mask & other.mask):
+                raise DiagnosisError(
+                    held.source, "is the recording that is learnt from, too", "hold another recording back for --validate"
+                )
+
+
+def of_use(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Those of ``records`` in which a force moves the axis, and a note for each that is left out.
+
+    Raises:
+        DiagnosisError: there is none.
+    """
+    held, notes = [], []
+    refusal: DiagnosisError | None = None
+    for record in records:
+        if _rests(record.position):
+            problem, remedy = "holds nothing but rest", "record the axis in motion"
+        elif float(np.ptp(record.effort)) == 0.0:
+            problem, remedy = "has no force signal: it never changes", "record the effort, or give --topic"
+        else:
+            held.append(record)
+            continue
+        refusal = refusal or DiagnosisError(record.source, problem, remedy)
+        notes.append(f"{record.source} {problem}: left out")
+    if not held and refusal is not None:
+        raise refusal
+    return held, notes
+
+
+def _rests(position: Array) -> bool:
+    """True where a position shows nothing but its noise, or flickers between neighbouring steps of its encoder."""
+    return float(np.ptp(position)) <= _STILL * noise_of(position) or np.unique(position).size <= _FLICKERS
+
+
+def without_faults(
+    train: Sequence[Record], validation: Sequence[Record], nominal: Model, checks: Sequence[Check]
+) -> tuple[list[Record], list[Record], list[str]]:
+    """The recordings without the faults of sign, unit and clock that can be taken out of them.
+
+    What all recordings learnt from have is taken out of those held back alike, unless these are seen not to have it; what these
+    alone have is taken out of them. A delay is left in: it may belong to the axis, and is a candidate like others.
+    """
+    held, kept_apart, notes = list(train), list(validation), []
+    wrong = [(check, correction) for check in checks if (correction := _correction_of(check)) is not None]
+    for check, correction in wrong:
+        for k in range(len(held)) if check.recording is None else [check.recording]:
+            held[k] = correction.apply(held[k])
+        notes.append(f"corrected before anything was fitted: {correction.text} ({check.detail})")
+    of_all: dict[str, Correction] = {}
+    for check, correction in wrong:
+        if check.recording is None or sum(each.check == check.check for each, _ in wrong) == len(held):
+            of_all.setdefault(check.check, correction)
+    for k, record in enumerate(validation):
+        seen = inspect([record], nominal)
+        right = {check.check for check in seen if check.verdict == "ok"}
+        for name, correction in of_all.items():
+            if name in right:
+                notes.append(f"{record.source} is right as it is: not corrected by {correction.text}")
+            else:
+                kept_apart[k] = correction.apply(kept_apart[k])
+        for check in seen:
+            own = _correction_of(check)
+            if own is not None and check.check not in of_all:
+                kept_apart[k] = own.apply(kept_apart[k])
+                notes.append(f"corrected in {record.source} alone: {own.text} ({check.detail})")
+    return held, kept_apart, notes
+
+
+def _correction_of(check: Check) -> Correction | None:
+    """What takes the fault out that ``check`` has found, or None."""
+    delayed = check.correction is None or check.correction.effort_shift != 0.0
+    return None if delayed or check.verdict != "fault" else check.correction

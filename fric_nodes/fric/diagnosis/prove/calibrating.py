@@ -1,0 +1,103 @@
+"""Learning the map from evidence to probability (:mod:`..calibration`) from examinations that are over.
+
+Every finding beside something unknown is one trial: the effect was concealed in that case or not. The weights maximise the
+penalised likelihood of all trials (logistic regression; a normal prior on the weights and a narrower one on what is added per
+effect, so that an effect that was seldom seen is taken for an ordinary one). Each weight is kept from falling below zero.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from ...errors import InputError
+from ...record import Array
+from ..calibration import FORMAT, Evidence, measures_of
+from .sealing import case_folder, open_key, published
+
+__all__ = ["Trial", "fitted", "learnt", "trials_of"]
+
+_WEIGHT = 2.0  # statistical: standard deviation of a weight before anything is known
+_EFFECT = 1.0  # statistical: of what is added for an effect: odds of three to one are nothing special
+_FEWEST = 30  # statistical: trials from which weights can be learnt
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One finding: of which effect, what spoke for it, and whether it was right."""
+
+    effect: str
+    evidence: Evidence
+    right: bool
+
+
+def trials_of(out: Path) -> Iterator[Trial]:
+    """The findings beside something unknown of the examination in the folder ``out``.
+
+    Raises:
+        InputError: it holds none.
+    """
+    if published(out) is None:
+        raise InputError(out, "holds no examination", "give a folder that 'fric prove --out FOLDER' has written")
+    for key in open_key(out):
+        at = case_folder(out, key["number"]) / "report.json"
+        findings = json.loads(at.read_text(encoding="utf-8"))["findings"] if at.exists() else []
+        if not any(each["effect"] == "unknown" for each in findings):
+            continue
+        for each in findings:
+            if each.get("weighed"):
+                evidence = Evidence(**{name: math.inf if value is None else value for name, value in each["weighed"].items()})
+                yield Trial(each["effect"], evidence, each["effect"] in key["effects"])
+
+
+def learnt(outs: Sequence[Path]) -> dict[str, Any]:
+    """The content of ``calibration.json``, learnt from the examinations in ``outs``.
+
+    Raises:
+        InputError: no examination, or too few findings.
+    """
+    trials = [trial for out in outs for trial in trials_of(out)]
+    if len(trials) < _FEWEST:
+        problem = f"hold {len(trials)} findings beside something unknown, at least {_FEWEST} are needed"
+        raise InputError(", ".join(str(out) for out in outs), problem, "give more examinations")
+    return {"format": FORMAT, "examinations": [_provenance(out) for out in outs], **fitted(trials)}
+
+
+def _provenance(out: Path) -> dict[str, Any]:
+    """Where the trials of a folder come from."""
+    orders = json.loads((out / "plan.json").read_text(encoding="utf-8"))
+    return {"cases": len(orders), "variant": orders[0]["variant"], "sha256": published(out)}
+
+
+def fitted(trials: Sequence[Trial]) -> dict[str, Any]:
+    """Offset, weights and what is added per effect, as plain data, with the number of findings and of right ones."""
+    measures = [measures_of(trial.evidence) for trial in trials]
+    names, effects = list(measures[0]), sorted({trial.effect for trial in trials})
+    table = np.array([[each[name] for name in names] for each in measures])
+    own = np.array([[trial.effect == effect for effect in effects] for trial in trials], dtype=np.float64)
+    right = np.array([trial.right for trial in trials], dtype=np.float64)
+    columns = np.hstack([np.ones((len(trials), 1)), table, own])
+    spread = np.concatenate([[np.inf], np.full(len(names), _WEIGHT), np.full(len(effects), _EFFECT)])
+
+    def cost(weights: Array) -> tuple[float, Array]:
+        odds = columns @ weights
+        value = float(np.sum(np.logaddexp(0.0, odds) - right * odds) + 0.5 * np.sum((weights / spread) ** 2))
+        return value, columns.T @ (1.0 / (1.0 + np.exp(-odds)) - right) + weights / spread**2
+
+    bounds = [(None, None), *[(0.0, None)] * len(names), *[(None, None)] * len(effects)]
+    found = minimize(cost, np.zeros(columns.shape[1]), jac=True, bounds=bounds, method="L-BFGS-B").x
+    weights, added = found[1 : 1 + len(names)], found[1 + len(names) :]
+    return {
+        "findings": len(trials),
+        "right": int(np.sum(right)),
+        "offset": round(float(found[0]), 4),
+        "weights": {name: round(float(value), 4) for name, value in zip(names, weights, strict=True)},
+        "effects": {name: round(float(value), 4) for name, value in zip(effects, added, strict=True)},
+    }
