@@ -86,6 +86,7 @@ def test_every_broken_recording_is_reported_and_stops_none(logs: Path, job: Job,
     assert not any("error of fric" in line for line in refused.values()), refused
 
 
+@pytest.mark.long
 def test_workers_that_die_cost_their_recording_only(logs: Path, job: Job, tmp_path: Path) -> None:
     mapping = "time: {from: t, unit: s}\nposition: {from: q, unit: m}\neffort: {from: u, unit: N}\n"
     nothing = np.zeros(80_000_000)  # 640 MB that take 0.6 MB on the disk

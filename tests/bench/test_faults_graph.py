@@ -35,6 +35,7 @@ def expect_safe(names: list[str], times: int) -> None:
     assert len(lines) == len(names)
 
 
+@pytest.mark.long
 @pytest.mark.alone
 def test_a_few_faults_of_the_running_graph() -> None:
     expect_safe(SHORT, 1)

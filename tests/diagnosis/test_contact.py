@@ -83,6 +83,7 @@ def test_dry_friction_at_rest_and_in_motion_lacks_nothing() -> None:
     assert found.model.value("viscous.coefficient") == pytest.approx(VISCOUS, rel=0.15)
 
 
+@pytest.mark.long
 def test_a_force_without_inertia_is_refused_with_the_plant_that_it_asks_for() -> None:
     with pytest.raises(DiagnosisError, match=r"strokes 4: the force doesn't hold the inertia .* plant 'contact'"):
         diagnose([strokes(30.0, True, 4)], [strokes(30.0, True, 5)], nominal("rigid", mass=5.0))

@@ -158,6 +158,7 @@ def test_a_drive_behind_topics(graph: Graph) -> None:
     graph.spin(robot)
     partner.force = 20.0
     graph.until(lambda: efforts and list(efforts[-1].data) == [0.0, 2.0], "efforts in the controller's order")
+    graph.until(lambda: partner.states, "states of the axis")
     assert partner.states[-1].name == ["axis"]
     assert partner.states[-1].position[0] == 0.5
     assert partner.states[-1].effort[0] == pytest.approx(1.0)

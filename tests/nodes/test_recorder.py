@@ -115,6 +115,7 @@ def test_nothing_is_lost_at_thousands_of_messages_a_second(graph: Any, tmp_path:
     assert times == sorted(times)
 
 
+@pytest.mark.long
 def test_stamp_order_gives_the_same_bag_twice(graph: Any, tmp_path: Path) -> None:
     contents = []
     for run in range(2):
