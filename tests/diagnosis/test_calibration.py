@@ -12,7 +12,7 @@ from fric.diagnosis.calibration import Calibration, Evidence, calibration, measu
 from fric.diagnosis.prove.calibrating import Trial, fitted, learnt
 from fric.errors import InputError
 
-PLAIN = Evidence(margin=1.0, share=0.3, rest=0.2, halves=50.0, functions=40.0)
+PLAIN = Evidence(share=0.3, rest=0.2, halves=50.0, functions=40.0)
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_what_findings_were_drawn_from_is_learnt_and_calibrated() -> None:
     for _ in range(3000):
         effect = str(random.choice(["stribeck", "ripple"]))
         share, rest, halves, functions = random.uniform([0.01, 0.01, 0.0, 0.0], [1.0, 0.9, 300.0, 300.0])
-        evidence = Evidence(1.0, share, rest, halves, functions)
+        evidence = Evidence(share, rest, halves, functions)
         trials.append(Trial(effect, evidence, bool(random.random() < true.probability(effect, evidence))))
     content = fitted(trials[:1500])
     found = Calibration(content["offset"], content["weights"], content["effects"])

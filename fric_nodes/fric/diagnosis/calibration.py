@@ -27,15 +27,14 @@ class Evidence:
     """What speaks for one effect.
 
     Attributes:
-        margin: logarithm of what the best rival leaves over what the effect leaves, the price of parameters included.
         share: of what is missing that the effect explains, 0 to 1.
         rest: share of what is missing that stays unexplained, 0 to 1.
         halves: how likely each half of the recordings makes it, judged on the other one; the smaller of both [nats].
-        functions: evidence for it where flexible functions of all other components are there [nats].
+        functions: evidence for it where flexible functions of all other components are there [nats]; infinite where
+            that was not asked.
         rivals: probability of the effect among itself and what was fitted in its place.
     """
 
-    margin: float
     share: float
     rest: float
     halves: float

@@ -58,9 +58,7 @@ from .result import (
     Validation,
 )
 from .settle import FLOOR_KNOWN
-from .start import (
-    spread_of,
-)
+from .start import spread_of
 from .track import Track
 
 __all__ = ["concluded"]

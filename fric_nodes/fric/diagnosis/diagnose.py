@@ -32,9 +32,7 @@ from .intake import of_use, refuse, without_faults
 from .judging import most_left
 from .ladder import ladder_of
 from .price import FAR_OFF, implausible
-from .result import (
-    Diagnosis,
-)
+from .result import Diagnosis
 from .start import (
     DiagnosisError,
     held_as,

@@ -28,9 +28,7 @@ from .result import (
 from .rival import Rival
 from .screen import Tried
 from .settle import Step
-from .start import (
-    FIRST_FIT,
-)
+from .start import FIRST_FIT
 from .track import Track
 
 __all__ = [
@@ -44,8 +42,8 @@ __all__ = [
     "unlearnt_finding",
 ]
 
-_SHARED = 1.0 / 3.0  # of what is missing: where so many are missed by less altogether, each does the work of the others
-_IN_PART = 0.6  # of what several explain: where they are missed by less, they do each other's work in part, and
+_SHARED = 1.0 / 3.0  # of what is missing: where effects are missed by less altogether, each can stand in for the others
+_IN_PART = 0.6  # of what several explain: where they are missed by less, they stand in for each other in part, and
 _AS_MUCH = 0.9  # of what they explain is as much
 _FEW = 16  # coefficients, by which a signature is simpler than so many effects
 _MOSTLY = 0.5  # of what a grown model leaves, for a signature to say what that is

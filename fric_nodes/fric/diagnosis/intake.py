@@ -11,9 +11,7 @@ from ..instrument import Finding as Check
 from ..model import Model
 from ..record import Array, Record
 from ..signals.resolution import noise_of
-from .start import (
-    DiagnosisError,
-)
+from .start import DiagnosisError
 
 __all__ = ["of_use", "refuse", "without_faults"]
 

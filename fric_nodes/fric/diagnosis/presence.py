@@ -25,7 +25,6 @@ from .additive.asked import Asked
 from .additive.residual import independent_values
 from .calibration import Evidence, calibration
 from .candidates import scales_of
-from .confidence import margin_of
 from .fitting import bounds_of, free_names, refit, without_term
 from .settle import Step
 from .track import Track
@@ -76,14 +75,14 @@ def presences(
         shares: of what is missing that each of them explains, by the name of the term.
         unexplained: share of what is missing that it leaves, 0 to 1.
     """
+    if not steps:
+        return {}
     left = track.residual(end)
     n = left.shape[0]
     independent = independent_values(track, left)
     first = (np.arange(n) * 4 // n) % 2 == 0
     with_all = [_on_other(track, end, rows) for rows in (first, ~first)]
     found: dict[str, Presence] = {}
-    if not steps:
-        return {}
     asked = Asked(track, refit(track, end, _ITERATIONS))
     places = list(end.prefixes)
     for step in steps:
@@ -95,7 +94,7 @@ def presences(
             halves.append(Half(nats, own))
         least = min(each.nats for each in halves)
         functions = asked.nats(places.index(step.term))
-        evidence = Evidence(margin_of(step), shares[step.term], unexplained, least, functions, _among_rivals(step, independent))
+        evidence = Evidence(shares[step.term], unexplained, least, functions, _among_rivals(step, independent))
         sure = calibration().probability(step.term.split("#")[0], evidence)
         found[step.term] = Presence(round(sure, 4), (halves[0], halves[1]), evidence)
     return found
