@@ -75,6 +75,7 @@ class Context(NamedTuple):
         acceleration: [x/s^2]; only its sign, and only for effects with ``uses_acceleration``; 0 otherwise.
         step: length of the step of which this is the middle [s]; 0 for an instant.
         memory: states of all terms with memory, shape ``(n_memory,)``, at the start of the step.
+        push: force that pushes the body [F], of the actuator or what a transmission passes on; for effects with ``uses_push``.
     """
 
     position: float
@@ -86,6 +87,7 @@ class Context(NamedTuple):
     acceleration: float
     step: float
     memory: Any
+    push: float
 
 
 Compiled = Callable[..., float]
@@ -124,6 +126,7 @@ class Effect:
         velocities: numbers of those that begin with the velocity of the body, of what is carried along by it.
         n_constants: number of constants, or a function of the values.
         uses_acceleration: True when it depends on the sign of the acceleration.
+        uses_push: True when it depends on the force that pushes the body.
         rate: fastest rate [1/s] of the effect on a body of the given mass, from ``(mass, *values)``; sets the step. None: slow.
         absent: values of nonlinear parameters at which the effect does nothing, however the others are.
         passes_for: parameters that another effect's parameter has held, too, where this effect was not known: name, and the
@@ -159,6 +162,7 @@ class Effect:
     velocities: tuple[int, ...] = ()
     n_constants: Count = 0
     uses_acceleration: bool = False
+    uses_push: bool = False
     rate: Callable[..., float] | None = None
     absent: Mapping[str, float] = field(default_factory=dict)
     passes_for: Mapping[str, str] = field(default_factory=dict)

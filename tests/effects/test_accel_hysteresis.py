@@ -38,13 +38,13 @@ def test_the_exponential_law_falls_as_a_stribeck_curve_and_only_while_speeding_u
     assert level is not None
     one, two = 0.36787944117144233, 0.018315638888734179  # 1/e and 1/e^4
     for v, a, left in ((V_S, 1.0, one), (2.0 * V_S, 1.0, two), (V_S, -1.0, 0.0), (50.0 * V_S, 1.0, 0.0)):
-        c = Context(0.0, -v, -1.0, 0.0, 1.0, 0.0, -a, 0.0, np.zeros(0))
+        c = Context(0.0, -v, -1.0, 0.0, 1.0, 0.0, -a, 0.0, np.zeros(0), 0.0)
         assert level(c, F_C, F_S - F_C, V_S, 2.0) == pytest.approx(F_C + left * (F_S - F_C))
 
 
 def test_at_rest_it_pushes_back_with_the_static_level_from_either_side() -> None:
     for side in (1.0, -1.0):
-        c = Context(0.0, 0.0, side, 0.0, 1.0, 0.0, side, 0.0, np.zeros(0))
+        c = Context(0.0, 0.0, side, 0.0, 1.0, 0.0, side, 0.0, np.zeros(0), 0.0)
         assert EFFECTS["accel_hysteresis/rational"].level(c, F_C, F_S - F_C, V_S) == pytest.approx(F_S)  # type: ignore[misc]
         states, friction = Simulator(model_b()).run(np.full(50, 0.999999 * side * F_S), 1e-3)
         assert np.all(states == 0.0)

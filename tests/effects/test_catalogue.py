@@ -70,7 +70,7 @@ def inner(array: np.ndarray, n: int) -> np.ndarray:
 
 def context(velocity: float, step: float = 0.0, memory: Any = None, direction: float | None = None) -> Context:
     memory = np.zeros(0) if memory is None else memory
-    return Context(0.1, velocity, direction or math.copysign(1.0, velocity), 2.0, 1.3, 5.0, 0.0, step, memory)
+    return Context(0.1, velocity, direction or math.copysign(1.0, velocity), 2.0, 1.3, 5.0, 0.0, step, memory, 0.0)
 
 
 def offset(effect: Effect) -> tuple[int, ...]:

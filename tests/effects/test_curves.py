@@ -17,7 +17,7 @@ SPEEDS = [-2.0, -0.01, 1e-9, 0.003, 0.7]
 
 
 def context(velocity: float = 0.0, position: float = 0.0, step: float = 0.0) -> Context:
-    return Context(position, velocity, math.copysign(1.0, velocity), 0.0, 1.0, 0.0, 0.0, step, np.zeros(0))
+    return Context(position, velocity, math.copysign(1.0, velocity), 0.0, 1.0, 0.0, 0.0, step, np.zeros(0), 0.0)
 
 
 def level(key: str) -> Callable[..., float]:

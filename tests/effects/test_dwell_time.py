@@ -47,7 +47,7 @@ ALL = pytest.mark.parametrize("law", list(LAWS))
 def surplus(law: str, age: float, base: float = 0.0) -> float:
     """What the effect adds for a contact of this age, at an instant."""
     parameters = LAWS[law][0]
-    c = Context(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, np.array([age]))
+    c = Context(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, np.array([age]), 0.0)
     effect = EFFECTS[f"dwell_time/{law}"]
     return effect.level(c, base, 0, *effect.values({**parameters, "length": D_0}))  # type: ignore[misc]
 
@@ -77,7 +77,7 @@ def test_the_law_as_printed(law: str) -> None:
 def aged(velocity: Callable[[float], float], start: float, duration: float, h: float) -> float:
     memory = np.array([start])
     for k in range(round(duration / h)):
-        c = Context(0.0, velocity((k + 0.5) * h), 1.0, 0.0, 1.0, 0.0, 0.0, h, memory)
+        c = Context(0.0, velocity((k + 0.5) * h), 1.0, 0.0, 1.0, 0.0, 0.0, h, memory, 0.0)
         grow_older(c, 0, D_0)
     return float(memory[0])
 

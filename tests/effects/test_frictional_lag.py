@@ -42,7 +42,7 @@ def followed(
     middles = (np.arange(round(duration / h)) + 0.5) * h
     levels = np.empty(middles.shape[0])
     for k, (t, given) in enumerate(zip(middles, base(middles), strict=True)):
-        c = Context(0.0, 0.1, 1.0, t, 1.0, 0.0, 0.0, h, memory)
+        c = Context(0.0, 0.1, 1.0, t, 1.0, 0.0, 0.0, h, memory, 0.0)
         levels[k] = effect.level(c, float(given), 0, time, *MORE.get(law, ()))
         effect.remember(c, float(given), 0, time, *MORE.get(law, ()))
     return middles, levels

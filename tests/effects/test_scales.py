@@ -11,7 +11,7 @@ from fric.simulation import Simulator, predict_force
 
 
 def scaled(key: str, *p: float, q: float = 0.0, t: float = 0.0, load: float = 1.0, temperature: float = 0.0) -> float:
-    c = Context(q, 0.1, 1.0, t, load, temperature, 0.0, 0.0, np.zeros(0))
+    c = Context(q, 0.1, 1.0, t, load, temperature, 0.0, 0.0, np.zeros(0), 0.0)
     return EFFECTS[key].level(c, 3.0, *p)  # type: ignore[misc]
 
 
@@ -32,7 +32,7 @@ def test_scales_typed_a_second_time() -> None:
     assert scaled("time_drift/exponential", -0.4, 30.0, t=30.0) == pytest.approx(3.0 * (1.0 - 0.4 * 0.6321205588285577))
     assert scaled("time_drift/exponential", -0.4, 30.0, t=1e6) == pytest.approx(1.8)
     assert scaled("temperature/linear", -0.01, 0.3, temperature=20.0) == pytest.approx(2.4)
-    c = Context(0.0, -0.5, -1.0, 0.0, 1.0, 20.0, 0.0, 0.0, np.zeros(0))
+    c = Context(0.0, -0.5, -1.0, 0.0, 1.0, 20.0, 0.0, 0.0, np.zeros(0), 0.0)
     assert EFFECTS["temperature/linear"].force(c, -0.01, -0.3) == pytest.approx(3.0)  # type: ignore[misc]
 
 
@@ -44,7 +44,7 @@ def test_scales_of_other_forms() -> None:
     for warmer in (-10.0, 4.0, 20.0):
         left = scaled("temperature/quadratic", -0.02, 0.0, 2e-4, 0.0, temperature=warmer) - 3.0 * np.exp(-0.02 * warmer)
         assert left == pytest.approx(3.0 * (0.02 * warmer) ** 3 / 6.0, rel=0.12)
-    c = Context(0.0, -0.5, -1.0, 0.0, 1.0, 20.0, 0.0, 0.0, np.zeros(0))
+    c = Context(0.0, -0.5, -1.0, 0.0, 1.0, 20.0, 0.0, 0.0, np.zeros(0), 0.0)
     assert EFFECTS["temperature/quadratic"].force(c, -0.01, -0.3, 0.0, 0.01) == pytest.approx(1.0)  # type: ignore[misc]
     # A Lorentz curve, and nearly a bell; both are bent alike at the top.
     assert scaled("position_dependence/peak", 0.5, 0.1, 0.02, 1.0, q=0.1) == 4.5

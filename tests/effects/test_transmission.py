@@ -250,7 +250,7 @@ def test_damped_two_masses_against_the_closed_form() -> None:
 
 
 def context(velocity: float, step: float, memory: Array) -> Context:
-    return Context(0.0, velocity, 1.0, 0.0, 1.0, 0.0, 0.0, step, memory)
+    return Context(0.0, velocity, 1.0, 0.0, 1.0, 0.0, 0.0, step, memory, 0.0)
 
 
 @pytest.mark.parametrize("zeta", [0.0, 0.03, 0.9999999, 1.0, 1.0000001, 2.5])

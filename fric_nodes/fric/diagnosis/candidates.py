@@ -131,8 +131,8 @@ def candidates(model: Model, scales: Scales) -> list[Candidate]:
             continue
         if (effect.link is not None or effect.play is not None) and PLANTS[model.plant.id].driven is None:
             continue
-        if model.plant.led and effect.place in (Place.COMMAND_PATH, Place.TRANSMISSION):
-            continue  # the force is measured behind both
+        if model.plant.led and (effect.place in (Place.COMMAND_PATH, Place.TRANSMISSION) or effect.uses_push):
+            continue  # the force is measured behind all of them
         if play and (effect.link is None) != (effect.play is None):
             continue  # a spring beyond a play is the same as elastic stops, and one play is enough
         if effect.level is not None and effect.remember is not None and not has_level:

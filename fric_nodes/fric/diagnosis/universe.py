@@ -4,11 +4,12 @@ A diagnosis tries hundreds of models: each candidate, alone and with others. Com
 so there is one structure that holds all effects which some value of a parameter makes vanish
 (:attr:`fric.effect.Effect.neutral`), and a model is a vector of values for it. Slip dynamics and transmissions have no
 such value: they change what the states are. A structure that holds one of them is a further universe, and there are as many as
-models ask for.
+models ask for. Effects of which a model may have several have two places in each; more places make another universe.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -25,6 +26,9 @@ from ..record import Array
 __all__ = ["Universe", "common_effects", "universe_of", "worth_trying"]
 
 
+_PLACES = 2  # numerical: of a repeatable effect; each costs compiling time, and a look at its switch in every step
+
+
 @dataclass(frozen=True, eq=False)
 class Universe:
     """One compiled structure and where its values are.
@@ -34,14 +38,14 @@ class Universe:
         effects: in the order of assembly.
         loops: compiled.
         neutral: values at which every effect is absent and switched off, the plant's own zero, shape ``(n_values,)``.
-        offset: of each effect's first value, by its key.
+        places: of each effect in ``effects`` and of its first value, by its key; several where it may come several times.
     """
 
     plant: Plant
     effects: tuple[Effect, ...]
     loops: Loops
     neutral: Array
-    offset: Mapping[str, int]
+    places: Mapping[str, tuple[tuple[int, int], ...]]
 
     def values(self, model: Model) -> Array:
         """The values of ``model`` for this structure, shape ``(n_values,)``."""
@@ -52,10 +56,11 @@ class Universe:
         return values
 
     def put(self, values: Array, term: Term) -> None:
-        """Switch ``term`` on in ``values``."""
-        at = self.offset[term.effect.key]
+        """Switch ``term`` on in ``values``, at a place of its effect that is still free."""
+        switches = len(values) - len(self.effects)
+        number, at = next(place for place in self.places[term.effect.key] if values[switches + place[0]] == 0.0)
         values[at : at + len(term.values)] = term.values
-        values[len(values) - len(self.effects) + self.effects.index(term.effect)] = 1.0
+        values[switches + number] = 1.0
 
     def inner_states(self, model: Model, velocity: float = 0.0, force: float = 0.0) -> tuple[Array, Array]:
         """States of the slip dynamics and memory of all effects at the start of a run.
@@ -90,22 +95,23 @@ def worth_trying() -> tuple[Effect, ...]:
 
 
 def universe_of(model: Model) -> Universe:
-    """The structure that holds the common effects and every term of ``model``."""
+    """The structure that holds the common effects and every term of ``model``, and one more of what may come again."""
     common = {effect.key for effect in common_effects()}
-    own = tuple(sorted(held.effect.key for held in model.terms if held.effect.key not in common))
-    return _universe(model.plant, own)
+    own = [held.effect.key for held in model.terms if held.effect.key not in common]
+    for key, count in Counter(held.effect.key for held in model.terms if held.effect.repeatable).items():
+        own += [key] * max(count + 1 - _PLACES, 0)
+    return _universe(model.plant, tuple(sorted(own)))
 
 
 @lru_cache(maxsize=64)
 def _universe(plant: Plant, own: tuple[str, ...]) -> Universe:
     places = list(Place)
-    effects = sorted(
-        (*common_effects(), *(EFFECTS[key] for key in own)), key=lambda effect: (places.index(effect.place), effect.order)
-    )
+    common = [effect for effect in common_effects() for _ in range(_PLACES if effect.repeatable else 1)]
+    effects = sorted((*common, *(EFFECTS[key] for key in own)), key=lambda effect: (places.index(effect.place), effect.order))
     neutral: list[float] = [0.0] * len(plant.parameters)
-    offset = {}
-    for effect in effects:
-        offset[effect.key] = len(neutral)
+    at: dict[str, tuple[tuple[int, int], ...]] = {}
+    for number, effect in enumerate(effects):
+        at[effect.key] = (*at.get(effect.key, ()), (number, len(neutral)))
         neutral += effect.neutral or [1.0] * len(effect.parameters)
     neutral += [0.0] * len(effects)  # the switches
-    return Universe(plant, tuple(effects), loops_for(plant, effects, switched=True), np.array(neutral), offset)
+    return Universe(plant, tuple(effects), loops_for(plant, effects, switched=True), np.array(neutral), at)

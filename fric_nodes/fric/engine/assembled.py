@@ -15,6 +15,7 @@ __all__ = [
     "ELASTIC",
     "MEMORY",
     "N_STATES",
+    "PUSHED",
     "RIGID",
     "SEEN",
     "SEEN_RATE",
@@ -30,6 +31,7 @@ __all__ = [
     "own",
     "play",
     "prepare",
+    "pushed",
     "remember",
     "remembers",
     "slip",
@@ -42,6 +44,9 @@ RIGID = True
 
 ACCELERATION = False
 """True when a term depends on the sign of the acceleration."""
+
+PUSHED = False
+"""True when a term depends on the force that pushes the body."""
 
 ELASTIC = False
 """True when a term of the transmission gives a force, so that motor and load are two bodies always."""
@@ -85,6 +90,11 @@ class Surroundings(NamedTuple):
 
 def bends(p: Any) -> bool:
     """True when a term that is there depends on the sign of the acceleration."""
+    raise AssertionError("a stand-in, see the module")
+
+
+def pushed(p: Any) -> bool:
+    """True when a term that is there depends on the force that pushes the body."""
     raise AssertionError("a stand-in, see the module")
 
 

@@ -134,6 +134,7 @@ class _Assembly:
         self.force: list[str] = []
         self.remember: list[str] = []
         self.bending: list[Effect] = []
+        self.pushed: list[Effect] = []
         self.remembering: list[Effect] = []
         self.slip = "    return 0.0"
         self.command: list[str] = []
@@ -158,9 +159,11 @@ class _Assembly:
         if self._switches is not None and effect.neutral is not None:
             switch = f"if {self._switches} & {1 << number}: "
             given = [f"hidden({each})" for each in parameters]
-            self._bits[effect] = 1 << number
+            self._bits[effect] = self._bits.get(effect, 0) | 1 << number
         if effect.uses_acceleration:
             self.bending.append(effect)
+        if effect.uses_push:
+            self.pushed.append(effect)
         if effect.remember is not None:
             self.remembering.append(effect)
         kept = (str(self._memory),) if effect.n_memory else ()
@@ -185,7 +188,7 @@ class _Assembly:
         """Condition under which one of ``effects`` is there."""
         if not all(effect in self._bits for effect in effects):
             return "True"
-        return f"{self._switches} & {sum(self._bits[effect] for effect in effects)} != 0" if effects else "False"
+        return f"{self._switches} & {sum(self._bits[effect] for effect in set(effects))} != 0" if effects else "False"
 
     def _prepare(self, call: Callable[..., str]) -> tuple[str, str]:
         # At most one term has constants, since only slip dynamics take them: its offset is 0.
@@ -216,6 +219,7 @@ def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
         *parts.imports,
         f"RIGID = {all(effect.slip is None for effect in effects)}",
         f"ACCELERATION = {any(effect.uses_acceleration for effect in effects)}",
+        f"PUSHED = {any(effect.uses_push for effect in effects)}",
         f"ELASTIC = {any(effect.link is not None for effect in effects)}",
         f"MEMORY = {any(effect.remember is not None for effect in effects)}",
         f"N_STATES = {len(plant.states)}",
@@ -223,6 +227,8 @@ def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
         *_unpacking(n_parameters, len(effects) if switched else 0),
         "@kernel\ndef bends(p):",
         f"    return {parts.any_of(parts.bending)}",
+        "@kernel\ndef pushed(p):",
+        f"    return {parts.any_of(parts.pushed)}",
         "@kernel\ndef remembers(p):",
         f"    return {parts.any_of(parts.remembering)}",
         *_summing("level_sum(c, p)", parts.level),

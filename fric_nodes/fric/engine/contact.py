@@ -41,13 +41,13 @@ __all__ = ["CONTACT_FUNCTIONS", "contact_step", "glide", "opposing", "slide", "s
 
 @kernel
 def opposing(
-    p: Any, s: Inner, q: float, w: float, h: float, side: float, bend: float, around: Surroundings
+    p: Any, s: Inner, q: float, w: float, u: float, h: float, side: float, bend: float, around: Surroundings
 ) -> tuple[float, float]:
-    """Force of plant and terms, and mean friction force of the contact [F], over ``h`` at the mean velocity ``w``."""
+    """Force of plant and terms, and the contact's mean friction [F], over ``h`` at the mean velocity ``w`` under ``u``."""
     direction = side
     if not RIGID and w != 0.0:
         direction = 1.0 if w > 0.0 else -1.0
-    c = Context(q + 0.5 * w * h, w, direction, around.time + 0.5 * h, around.load, around.temperature, bend, h, s.memory)
+    c = Context(q + 0.5 * w * h, w, direction, around.time + 0.5 * h, around.load, around.temperature, bend, h, s.memory, u)
     friction = side * level(c, p) if RIGID else slip(s.z, s.z_next, w, h, level(c, p), s.constants, p)
     return own(c, p) + force(c, p), friction
 
@@ -77,7 +77,7 @@ def solve(
         if not RIGID and not first:
             for j in range(n):
                 s.z_next[n + j] = s.z_next[j]
-        force_b, friction_b = opposing(p, s, q, w_b, h, side, bend, around)
+        force_b, friction_b = opposing(p, s, q, w_b, u, h, side, bend, around)
         if first:
             rest = u - force_b - friction_b
             if which and bend > 0.0 and not rest > 0.0:
@@ -158,10 +158,10 @@ def slide(p: Any, m: float, x: Any, x_next: Any, s: Inner, u: float, h: float, a
         side = math.copysign(1.0, v)
         push = 0.0
         if v == 0.0:
-            c = Context(q, 0.0, 1.0, around.time, around.load, around.temperature, 0.0, left, s.memory)
+            c = Context(q, 0.0, 1.0, around.time, around.load, around.temperature, 0.0, left, s.memory, u)
             push = u - own(c, p) - force(c, p)
             side = 1.0 if push > 0.0 else -1.0
-            c = Context(q, 0.0, side, around.time, around.load, around.temperature, side, left, s.memory)
+            c = Context(q, 0.0, side, around.time, around.load, around.temperature, side, left, s.memory, u)
             if abs(push) <= level(c, p):
                 if left == h:
                     x_next[0] = q
@@ -185,7 +185,7 @@ def slide(p: Any, m: float, x: Any, x_next: Any, s: Inner, u: float, h: float, a
         friction = 0.0
         # The middle of the stop depends on how long it takes, which the trial before tells well enough.
         for _ in range(3):
-            c = Context(q + 0.5 * w * stop, w, side, around.time, around.load, around.temperature, -side, stop, s.memory)
+            c = Context(q + 0.5 * w * stop, w, side, around.time, around.load, around.temperature, -side, stop, s.memory, u)
             friction = side * level(c, p)
             braking = side * (own(c, p) + force(c, p) + friction - u)
             # Not longer than what is left: so it would be only where the step is too long for the law.

@@ -12,6 +12,7 @@ from ..effect import Context
 from .assembled import (
     MEMORY,
     N_STATES,
+    PUSHED,
     RIGID,
     SEEN,
     SEEN_RATE,
@@ -22,6 +23,7 @@ from .assembled import (
     force,
     level_sum,
     prepare,
+    pushed,
     remember,
     remembers,
     slip,
@@ -49,7 +51,9 @@ def advance(p: Any, x: Any, x_next: Any, s: Inner, u: float, h: float, around: S
         bend = 1.0 if change > 0.0 else (-1.0 if change < 0.0 else 0.0)
         direction = -1.0 if w < 0.0 else 1.0
         remember(
-            Context(0.5 * (q + x[0]), w, direction, around.time + 0.5 * h, around.load, around.temperature, bend, h, s.memory),
+            Context(
+                0.5 * (q + x[0]), w, direction, around.time + 0.5 * h, around.load, around.temperature, bend, h, s.memory, u
+            ),
             p,
         )
     return friction
@@ -107,15 +111,23 @@ def predict(
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
         direction = 1.0 if v[k] > 0.0 else (-1.0 if v[k] < 0.0 else 0.0)
-        c = Context(q[k], v[k], direction, t[k], load_k, temperature_k, a[k], h, memory)
-        if RIGID:
-            friction = direction * level_sum(c, p)
-        else:
-            friction = slip(z, z_next, v[k], h, level_sum(c, p), constants, p)
+        c = Context(q[k], v[k], direction, t[k], load_k, temperature_k, a[k], h, memory, 0.0)
+        rest = drive(p, q[k], v[k], a[k]) + force(c, p)
+        push = without = 0.0
+        # Friction is a straight line over the force that pushes, on either side of none: with none, with what is found then,
+        # and where the line through both gives what pushed.
+        for trial in range(3 if PUSHED and pushed(p) else 1):
+            c = Context(q[k], v[k], direction, t[k], load_k, temperature_k, a[k], h, memory, push)
+            friction = direction * level_sum(c, p) if RIGID else slip(z, z_next, v[k], h, level_sum(c, p), constants, p)
+            if trial == 0:
+                without = push = rest + friction
+            elif trial == 1 and push != 0.0:
+                push = without / max(1.0 - (rest + friction - without) / push, 0.05)
+        if not RIGID:
             for j in range(z.shape[0]):
                 z[j] = z_next[j]
         friction_out[k] = friction
-        u_out[k] = drive(p, q[k], v[k], a[k]) + force(c, p) + friction
+        u_out[k] = rest + friction
         if MEMORY and remembers(p):
             remember(c, p)
 

@@ -182,14 +182,14 @@ def as_one(p: Any, m: float, dry: float, x: Any, x_next: Any, s: Inner, u: float
     for _ in range(5):
         side = 1.0 if v > 0.0 else -1.0
         if v == 0.0:
-            opposed, friction = opposing(p, s, q, 0.0, left, 1.0, 0.0, around)
+            opposed, friction = opposing(p, s, q, 0.0, u, left, 1.0, 0.0, around)
             push = u - opposed
             if not RIGID:
                 push -= friction
             side = 1.0 if push > 0.0 else -1.0
             held = dry
             if RIGID:
-                _, friction = opposing(p, s, q, 0.0, left, side, side, around)
+                _, friction = opposing(p, s, q, 0.0, u, left, side, side, around)
                 held += side * friction
                 friction = push - min(max(push, -dry), dry)
             if abs(push) <= held:

@@ -160,8 +160,9 @@ def load_in_step(p: Any, s: Inner, x: Any, h: float, around: Surroundings) -> fl
     # found for it to second.
     before = load * bearing_load(p, d, x[3] - x[1])
     side = 1.0 if x[1] > 0.0 else -1.0
-    c = Context(x[0], x[1], side, around.time, before, around.temperature, 0.0, h, s.memory)
-    gain = p[3] * d + p[4] * (x[3] - x[1]) - force(c, p) - side * level(c, p)
+    pull = p[3] * d + p[4] * (x[3] - x[1])
+    c = Context(x[0], x[1], side, around.time, before, around.temperature, 0.0, h, s.memory, pull)
+    gain = pull - force(c, p) - side * level(c, p)
     v = x[1] + 0.5 * h * gain / p[0]
     return load * bearing_load(p, d - 0.5 * h * x[1], x[3] - v)
 

@@ -170,7 +170,7 @@ def _forces(model: Model, q: Array, v: Array, t: Array) -> Array:
         force = held.effect.force
         if force is not None:
             for k in range(q.shape[0]):
-                c = Context(q[k], v[k], math.copysign(1.0, v[k]), t[k], 1.0, 0.0, 0.0, _STEP, nothing)
+                c = Context(q[k], v[k], math.copysign(1.0, v[k]), t[k], 1.0, 0.0, 0.0, _STEP, nothing, 0.0)
                 total[k] += force(c, *held.values)
     return total
 

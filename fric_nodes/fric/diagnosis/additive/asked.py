@@ -1,22 +1,24 @@
 """Evidence for each term of a fitted model where flexible functions of all components but its own are there.
 
-The missing force without the term, everything else moved at first order, is explained by these functions alone, or by them and
-the term. What they explain as well is no evidence for it, and what they explain of the rest is no noise that it has to stand
-out from.
+The missing force without the term, everything else fitted anew, is explained by these functions alone, or by them and the
+term. What they explain as well is no evidence for it, and what they explain of the rest is no noise that it has to stand out
+from. Everything else is fitted in full: of a term that other terms nearly do as well, little is its own, and less than what a
+first-order change of the others is wrong by.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..fitting import State, without_place
+from ..fitting import State, refit, without_place
 from ..track import Track
 from .evidence import Grouped
-from .residual import ALIKE, OWN, functions_of, independent_share
+from .residual import ALIKE, functions_of, independent_share
 
 __all__ = ["Asked"]
 
 _TERM = "term"  # name of a group
+_ITERATIONS = 8  # numerical: from where everything fits
 
 
 class Asked:
@@ -34,16 +36,12 @@ class Asked:
     def nats(self, place: int) -> float:
         """Evidence for the term number ``place`` of the model, the dependence of the rows counted [nats]."""
         fit = self._state.fit
-        without = self._track.residual(without_place(fit.model, place))
-        change = (without - fit.residual)[self._rows, None]
+        without = refit(self._track, without_place(fit.model, place), _ITERATIONS).fit
+        change = (without.residual - fit.residual)[self._rows, None]
         size = float(np.sqrt(np.mean(change**2)))
         if size == 0.0:
             return 0.0
-        prefix = f"{fit.model.prefixes[place]}."
-        others = np.array([not name.startswith(prefix) for name in fit.names])
-        grouped = Grouped(without[self._rows], fit.jacobian[self._rows][:, others], {**self._groups, _TERM: change / size})
-        if grouped.own(_TERM) < OWN:
-            return 0.0
+        grouped = Grouped(without.residual[self._rows], without.jacobian[self._rows], {**self._groups, _TERM: change / size})
         likeness = {name: grouped.likeness(_TERM, name) for name in self._groups}
         own = max(likeness, key=lambda name: likeness[name])
         beside = [name for name in self._groups if name != own or likeness[name] < ALIKE]

@@ -72,6 +72,8 @@ def _driven(p: Any, s: Any, late: Any, u: float, h: float, count: int, disturbed
     if p.heat > 0.0:
         s[_HEAT] += h / p.heat_time * ((u / p.heat_force) ** 2 - s[_HEAT])
         f /= 1.0 + p.heat * s[_HEAT]
+    if p.gain_ripple != 0.0:
+        f *= 1.0 + p.gain_ripple * math.sin(2.0 * math.pi * (s[_Y] if p.load_share > 0.0 else s[_Q]) / p.gain_ripple_period)
     return float(f * (1.0 - p.dip * disturbed))
 
 
@@ -236,7 +238,8 @@ def stepped(
     push = drive - resisting
     direction = math.copysign(1.0, s[_V]) if s[_V] != 0.0 else math.copysign(1.0, push)
     g = _lagging(p, s, history, level_before_lag(p, s[_V], direction, s[_RISING], s[_AGE]), h, count)
-    g = scaled(p, g, s[_Q], direction, t, load, warmer, disturbed) + p.gear * abs(f)
+    share = p.gear_driven if p.gear_form == 1.0 and drive * direction < 0.0 else p.gear
+    g = scaled(p, g, s[_Q], direction, t, load, warmer, disturbed) + share * abs(drive)
     inertia = mass + p.mass * (1.0 - p.load_share) if two and s[_SIDE] != 0.0 else mass
     before = _moved(p, s, z, elements, push, g, inertia, h)
     if two:

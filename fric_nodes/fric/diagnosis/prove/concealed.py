@@ -92,6 +92,16 @@ def _quadratic_drag(at: Setting, random: np.random.Generator, form: int) -> Call
     return lambda s: {"drag": 1.5 * s * at.friction / at.top_speed**2, "drag_form": float(form), "drag_velocity": at.top_speed}
 
 
+def _shear_thinning(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
+    velocity = at.top_speed * _spread(random, 0.03, 0.15)
+    return lambda s: {"shear": 0.5 * s * at.friction, "shear_velocity": velocity, "shear_form": float(form)}
+
+
+def _gear_friction(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
+    driven = float(random.uniform(0.2, 0.6))  # of what driving costs
+    return lambda s: {"gear": min(0.2 * s, 0.7), "gear_driven": driven * min(0.2 * s, 0.7), "gear_form": float(form)}
+
+
 def _stribeck(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
     velocity = at.top_speed * _spread(random, 0.015, 0.06)
     return lambda s: {"stribeck": 0.5 * s * at.friction, "stribeck_velocity": velocity, "stribeck_form": float(form)}
@@ -294,6 +304,8 @@ _CATALOGUE = (
     Concealed("viscous", _viscous, lacks=frozenset({"viscous"}), group="speed"),
     Concealed("bias", _bias, lacks=frozenset({"bias"}), group="constant"),
     Concealed("quadratic_drag", _quadratic_drag, forms=2, foreign=(2,), group="speed"),
+    Concealed("shear_thinning", _shear_thinning, forms=2, foreign=(2,), group="speed"),
+    Concealed("gear_friction", _gear_friction, forms=2),
     Concealed("stribeck", _stribeck, forms=3, foreign=(3,), lacks=frozenset({"stribeck"}), group="low speed", largest=2.5),
     Concealed("asymmetry", _asymmetry, group="constant"),
     Concealed(

@@ -4,7 +4,8 @@ Everything here is written from the papers once more. Where the concealed law mu
 other than 0), the other form is one that the literature uses for the same mechanism: Hess and Soom 1990 and Tustin 1947 for
 the fall of friction with speed, a power of the load, an Arrhenius-like change with temperature, a Lorentz curve for a tight
 spot, a soft knee for an amplifier. The last form of each is one that fric has no law for: a hyperbolic secant for falls with
-the speed, Vogel's viscosity, a spot with a flat top, a root of the load, drag of mixed powers, rest after Kato's root.
+the speed, Vogel's viscosity, a spot with a flat top, a root of the load, drag of mixed powers, rest after Kato's root, a
+lubricant that thins by a hyperbola.
 """
 
 from __future__ import annotations
@@ -115,6 +116,16 @@ def scaled(p: Any, g: float, q: float, direction: float, t: float, load: float, 
 
 
 @compiled
+def sheared(p: Any, r: float) -> float:
+    """Force [N] of a lubricant that thins while it is sheared, at ``r`` times its velocity."""
+    if p.shear_form == 0.0:
+        return float(p.shear * (1.0 - math.exp(-r)))
+    if p.shear_form == 1.0:
+        return float(0.5 * p.shear * r ** (2.0 / 3.0))
+    return float(p.shear * r / (1.0 + r))
+
+
+@compiled
 def smooth_force(p: Any, q: float, v: float, t: float, warmer: float, thinned: float, pulled: float) -> float:
     """All forces [N] on the body but friction of the contact and drive, positive against positive motion."""
     f = p.bias + (p.viscous + p.temperature_viscous * warmer + p.thixotropy * thinned) * v + p.asymmetry_viscous * abs(v)
@@ -125,6 +136,8 @@ def smooth_force(p: Any, q: float, v: float, t: float, warmer: float, thinned: f
             f += p.drag * p.drag_velocity**0.25 * math.copysign(abs(v) ** 1.75, v)
         else:
             f += p.drag * v * abs(v) * (0.4 + 0.6 * abs(v) / p.drag_velocity)
+    if p.shear > 0.0:
+        f += math.copysign(sheared(p, abs(v) / p.shear_velocity), v)
     if p.ripple_cosine != 0.0 or p.ripple_sine != 0.0:
         phase = _TWO_PI * q / p.ripple_period
         f += p.ripple_cosine * math.cos(phase) + p.ripple_sine * math.sin(phase)

@@ -1,8 +1,8 @@
 """Physics outside the vocabulary: what no effect of the registry equals, and where it sits.
 
 The right answer to these is ``unknown`` together with the place. Each is a fault or a property that machines have: a part that
-is picked up, a motor that heats up, a supply that dips, a drag chain, dirt, a floor that shakes, gears that rub the more the
-harder they press, grease that thins while it is being sheared, an encoder that doesn't run true.
+is picked up, a motor that heats up, a supply that dips, a drag chain, dirt, a floor that shakes, a motor whose gain repeats
+over position, grease that thins while it is being sheared, an encoder that doesn't run true.
 """
 
 from __future__ import annotations
@@ -70,8 +70,9 @@ def _floor(at: Setting, random: np.random.Generator, form: int) -> Callable[[flo
     return lambda s: {"floor": 0.2 * s * at.friction, "floor_frequency": frequency}
 
 
-def _gear(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
-    return lambda s: {"gear": min(0.25 * s, 0.7)}
+def _gain(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
+    period = at.travel * float(random.uniform(0.08, 0.2))
+    return lambda s: {"gain_ripple": min(0.15 * s, 0.6), "gain_ripple_period": period}
 
 
 def _thixotropy(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
@@ -86,7 +87,7 @@ def _eccentricity(at: Setting, random: np.random.Generator, form: int) -> Callab
     return lambda s: {"eccentricity": min(0.01 * s, 0.12) * period, "eccentricity_period": period}
 
 
-_GEARS = frozenset({"transmission", "guideway friction"})
+_MOTOR = frozenset({"command path", "load"})
 _LOAD, _GUIDEWAY, _COMMAND = frozenset({"load"}), frozenset({"guideway friction"}), frozenset({"command path"})
 
 _CATALOGUE = (
@@ -96,7 +97,7 @@ _CATALOGUE = (
     Outside("cable_chain", "a drag chain that pulls on one side, with play", _cable, _LOAD),
     Outside("dirt", "dirt on the guideway at times", _dirt, _GUIDEWAY, windows=True),
     Outside("floor_vibration", "a floor that shakes at a fixed frequency", _floor, _LOAD),
-    Outside("gear_friction", "friction in proportion to the motor's force", _gear, _GEARS),
+    Outside("gain_ripple", "a motor whose gain repeats over position", _gain, _MOTOR),
     Outside("thixotropy", "grease that thins while it is sheared", _thixotropy, _GUIDEWAY),
     Outside("eccentricity", "an encoder that runs out of true", _eccentricity, frozenset({"sensor"})),
 )  # fmt: skip

@@ -30,6 +30,7 @@ class Physics:
         acceleration, acceleration_velocity, acceleration_form: speeding up [N], [m/s]; 0 Hess and Soom, 1 Gaussian, 2 secant.
         asymmetry, asymmetry_viscous: half the difference forward less backward [N], [N s/m].
         drag, drag_form: [N s^2/m^2]; form 1: exponent 1.75 instead of 2, 2: partly 3, the same at ``drag_velocity`` [m/s].
+        shear, shear_velocity, shear_form: levels off [N], [m/s]; 0 exponential, 1 the power 2/3, 2 hyperbolic.
         presliding: 0 rigid, 1 bristle, 2 elements with slip dynamics, 3 population of elements that stick or slip.
         displacement: pre-sliding displacement, level over stiffness [m].
         presliding_damping: [N s/m], of the bristle or of the elements together.
@@ -55,7 +56,8 @@ class Physics:
         cable, cable_play, cable_position: one-sided drag chain [N/m], half width of its play [m], where it begins to pull [m].
         dirt: relative rise of the level in the windows.
         floor, floor_frequency: force from outside [N], [Hz].
-        gear: friction per force of the motor.
+        gear, gear_driven, gear_form: friction per force that drives the body, and, in form 1, that is driven back by it.
+        gain_ripple, gain_ripple_period: relative change of the drive's gain over position, [m].
         thixotropy, thixotropy_time, thixotropy_shear: viscous coefficient at rest [N s/m], [s], [1/m].
         eccentricity, eccentricity_period: error of the encoder [m], [m].
         elements: of pre-sliding of kinds 2 and 3, each with its share of the level and of the stiffness.
@@ -77,6 +79,9 @@ class Physics:
     drag: float = 0.0
     drag_form: float = 0.0
     drag_velocity: float = 1.0
+    shear: float = 0.0
+    shear_velocity: float = 1.0
+    shear_form: float = 0.0
     presliding: float = 0.0
     displacement: float = 1e-5
     presliding_damping: float = 0.0
@@ -137,6 +142,10 @@ class Physics:
     floor: float = 0.0
     floor_frequency: float = 1.0
     gear: float = 0.0
+    gear_driven: float = 0.0
+    gear_form: float = 0.0
+    gain_ripple: float = 0.0
+    gain_ripple_period: float = 1.0
     thixotropy: float = 0.0
     thixotropy_time: float = 1.0
     thixotropy_shear: float = 0.0

@@ -91,8 +91,22 @@ def _dwell_time(p: Physics) -> Term:
     return term("dwell_time", law, force=p.dwell, time=p.dwell_time, length=p.dwell_length)
 
 
+def _shear_thinning(p: Physics) -> Term:
+    if p.shear_form == 1.0:
+        return term("shear_thinning", "power", force=0.5 * p.shear / p.shear_velocity ** (2.0 / 3.0))
+    return term("shear_thinning", force=p.shear, velocity=p.shear_velocity)
+
+
+def _gear_friction(p: Physics) -> Term:
+    if p.gear_form == 1.0:
+        return term("gear_friction", "directional", driving=p.gear, driven=p.gear_driven)
+    return term("gear_friction", coefficient=p.gear)
+
+
 _MADE: Mapping[str, Callable[[Physics], Term]] = {
     "quadratic_drag": lambda p: term("quadratic_drag", coefficient=p.drag),
+    "shear_thinning": _shear_thinning,
+    "gear_friction": _gear_friction,
     "asymmetry": lambda p: term("asymmetry", force=p.asymmetry, coefficient=p.asymmetry_viscous),
     "frictional_lag": lambda p: term("frictional_lag", "delay" if p.lag == 3.0 else "first_order", time=p.lag_time),
     "dwell_time": _dwell_time,
