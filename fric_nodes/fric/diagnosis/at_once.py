@@ -15,7 +15,7 @@ from .adding import settled_again
 from .additive.together import grown_together, middle_of
 from .fitting import State, added, refit, without_place
 from .grow import grown_faster
-from .growth import AGAIN, FAINTLY, LITTLE, Growth, left_to_a_fast_observer, screened
+from .growth import AGAIN, LITTLE, Growth, fast_observer, left_to_a_fast_observer, screened
 from .price import implausible
 from .settle import CLEARLY, Step, audit, settled
 from .track import Track
@@ -36,8 +36,8 @@ def together(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None
         tell: told what comes.
     """
     tell("taking what is missing apart by the components of the machine")
-    track = middle_of(tracks)
-    begin = refit(track, nominal)
+    found = fast_observer(tracks, nominal)
+    track, begin = found or (middle := middle_of(tracks), refit(middle, nominal))
     end = grown_together(track, begin, tell)
     steps = _steps_to(track, nominal, end)
     return Growth(track, begin, end, steps, (), end.excess / max(begin.excess, 1e-300), ended=True)
@@ -120,14 +120,11 @@ def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None])
     """
     tell("looking for what helps beside it")
     track = growth.track
-    for each in sorted(tracks, key=lambda one: -one.bandwidth):
-        begin = refit(each, growth.begin.fit.model)
-        if each.bandwidth <= track.bandwidth or begin.excess > FAINTLY * begin.floor:
-            track = each
-            break
+    found = fast_observer(tracks, growth.begin.fit.model)
     start = replace(growth, beyond=0.0)
-    if track is not growth.track:
-        begin, end = (refit(track, state.fit.model) for state in (growth.begin, growth.end))
+    if found is not None and found[0].bandwidth > track.bandwidth:
+        track, begin = found
+        end = refit(track, growth.end.fit.model)
         rest = audit(track, begin.fit.model, end.fit.model) if growth.steps else 1.0
         start = replace(start, track=track, begin=begin, end=end, rest=rest)
     end = grown_together(track, start.end, tell, beside_unknown=True)

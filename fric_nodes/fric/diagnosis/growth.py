@@ -22,6 +22,7 @@ __all__ = [
     "FAINTLY",
     "LITTLE",
     "Growth",
+    "fast_observer",
     "left_to_a_fast_observer",
     "screened",
     "share_left",
@@ -90,11 +91,17 @@ def left_to_a_fast_observer(tracks: Sequence[Track], growth: Growth) -> float:
     A slow observer hardly hinders a model to stick and slip at other times than the axis. There a wrong structure may leave
     less than the true one.
     """
+    found = fast_observer(tracks, growth.begin.fit.model)
+    return growth.rest if found is None else refit(found[0], growth.end.fit.model).excess / found[1].excess
+
+
+def fast_observer(tracks: Sequence[Track], model: Model) -> tuple[Track, State] | None:
+    """The fastest observer to which what ``model`` lacks stands out from the floor, and the model fitted there, if any."""
     for track in sorted(tracks, key=lambda each: -each.bandwidth):
-        begin, end = (refit(track, state.fit.model) for state in (growth.begin, growth.end))
-        if begin.excess > FAINTLY * begin.floor:
-            return end.excess / begin.excess
-    return growth.rest
+        state = refit(track, model)
+        if state.excess > FAINTLY * state.floor:
+            return track, state
+    return None
 
 
 def without_nothings(growth: Growth, end: Model) -> tuple[Growth, Model]:

@@ -3,8 +3,10 @@
 Each law is weighed beside flexible functions of all other components (:mod:`.forms`), so that it has only its own part to
 explain, however many others are missing. Fitted alone it may explain little: what the others lack lies over it. So the most
 probable law of every component comes at the same time, everything is fitted together, and then each has to earn its place: the
-one that is missed least on unseen blocks goes, everything else is fitted anew, and so on (backward elimination). What is then
-left is taken apart again, until nothing comes that stays.
+one that is missed least goes, everything else is fitted anew, and so on (backward elimination). Where all together leave hardly
+anything, how much a law is missed is what unseen blocks lack without it. Where they leave more, it is the evidence for it beside
+flexible functions of the other components: of a law that is small beside what none explains, nothing can be seen otherwise. What
+is then left is taken apart again, until nothing comes that stays.
 """
 
 from __future__ import annotations
@@ -15,16 +17,16 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ..fitting import NOTHING, State, added, refit, unseen, without_place
+from ..growth import LITTLE
+from ..settle import CLEARLY
 from ..track import Track
 from .asked import Asked
 from .forms import Form, forms_of
 from .residual import additive
 
-__all__ = ["BANDWIDTH", "grown_together", "middle_of"]
+__all__ = ["grown_together", "middle_of"]
 
-BANDWIDTH = 140.0
-"""Of the observer [rad/s]: about 22 Hz, where most axes' friction shows and their structures don't yet ring."""
-
+_BANDWIDTH = 140.0  # physical [rad/s]: about 22 Hz, where most axes' friction shows and their structures don't yet ring
 _WORTH = 5.0  # statistical, nats: odds of about 150 to one, for a law to be fitted in full
 _GAIN = 10.0  # statistical, nats, for a law to stay: beyond what four parameters take off by chance
 _PLAUSIBLE = 0.3  # probability among the laws of its component
@@ -34,8 +36,8 @@ _TO_WEIGH = 8  # numerical, iterations from where everything fits
 
 
 def middle_of(tracks: Sequence[Track]) -> Track:
-    """The one of ``tracks`` whose bandwidth is nearest to :data:`BANDWIDTH`."""
-    return min(tracks, key=lambda each: abs(math.log(each.bandwidth / BANDWIDTH)))
+    """The one of ``tracks`` whose bandwidth is nearest to 140 rad/s."""
+    return min(tracks, key=lambda each: abs(math.log(each.bandwidth / _BANDWIDTH)))
 
 
 def grown_together(track: Track, begin: State, tell: Callable[[str], None], beside_unknown: bool = False) -> State:
@@ -45,8 +47,7 @@ def grown_together(track: Track, begin: State, tell: Callable[[str], None], besi
         track: the recordings.
         begin: the fitted model that lacks something.
         tell: told what comes and goes.
-        beside_unknown: where each law has to earn its place, take what flexible functions of the other components explain for
-            explained. Of one that is small beside what no law explains, nothing can be seen otherwise.
+        beside_unknown: what is left is known to be explained by no law.
     """
     state = begin
     for _ in range(_ROUNDS_BESIDE if beside_unknown else _ROUNDS):
@@ -57,15 +58,27 @@ def grown_together(track: Track, begin: State, tell: Callable[[str], None], besi
         offered = list(_offered(state, forms_of(state, taken)))
         if not offered:
             break
-        tell("trying together: " + ", ".join(f"{each.term.effect.title} ({each.nats:.0f} nats)" for each in offered))
-        terms = (*state.fit.model.terms, *(each.term for each in offered))
-        whole = refit(track, state.fit.model.with_terms(terms), 20)
-        grown = _asked_for(track, whole, begin, tell) if beside_unknown else _pruned(track, whole, begin, independent, tell)
-        if _nats(state, grown, independent) < (0.0 if beside_unknown else _GAIN) or _same(state, grown):
+        whole = _fitted(track, state, offered, tell)
+        partial = beside_unknown or whole.excess > max(LITTLE * begin.excess, CLEARLY * whole.floor)
+        grown = _asked_for(track, whole, begin, tell) if partial else _pruned(track, whole, begin, independent, tell)
+        if _nats(state, grown, independent) < (0.0 if partial else _GAIN) or _same(state, grown):
             break
         tell(f"leaves {100.0 * grown.excess / max(begin.excess, 1e-300):.0f} % of what was missing")
         state = grown
     return state
+
+
+def _fitted(track: Track, state: State, offered: Sequence[Form], tell: Callable[[str], None]) -> State:
+    """``state`` with the laws ``offered``, fitted together; with the better half of them where all are too many to begin with.
+
+    Each was weighed by itself: of laws that do the same work all together may overshoot so far that no fit comes back.
+    """
+    while True:
+        tell("trying together: " + ", ".join(f"{each.term.effect.title} ({each.nats:.0f} nats)" for each in offered))
+        whole = refit(track, state.fit.model.with_terms((*state.fit.model.terms, *(each.term for each in offered))), 20)
+        if whole.excess < state.excess or len(offered) == 1:
+            return whole
+        offered = offered[: len(offered) // 2]
 
 
 def _offered(state: State, forms: list[Form]) -> Iterator[Form]:
