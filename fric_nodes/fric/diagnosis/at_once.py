@@ -17,7 +17,7 @@ from .fitting import State, added, refit, without_place
 from .grow import grown_faster
 from .growth import AGAIN, LITTLE, Growth, fast_observer, left_to_a_fast_observer, screened
 from .price import implausible
-from .settle import CLEARLY, Step, audit, settled
+from .settle import CLEARLY, Step, audit
 from .track import Track
 
 __all__ = ["by_parts", "helped", "surpassing", "together"]
@@ -127,14 +127,19 @@ def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None])
         end = refit(track, growth.end.fit.model)
         rest = audit(track, begin.fit.model, end.fit.model) if growth.steps else 1.0
         start = replace(start, track=track, begin=begin, end=end, rest=rest)
-    end = grown_together(track, start.end, tell, beside_unknown=True)
+    end = grown_together(track, start.begin, tell, beside_unknown=True, state=start.end)
     more = _steps_to(track, start.end.fit.model, end)
     if not more:
         return growth
-    done = settled(track, start.begin, end, [*start.steps, *more])
-    if len(done.steps) <= len(growth.steps) or done.rest >= start.rest:
+    rest = audit(track, start.begin.fit.model, end.fit.model)
+    if rest >= start.rest:
         return growth
-    gone = (*growth.rejected, *done.gone)
-    last = screened(track, done.state)
-    grown = replace(start, end=done.state, begin=done.begin, steps=done.steps, rest=done.rest)
-    return replace(grown, rejected=gone, last=last, unhelped=growth, ended=True)
+    kept = {held.effect.key for held in end.fit.model.terms}
+    steps = tuple(step for step in start.steps if step.term in end.fit.model.prefixes)
+    gone = tuple(
+        (held.effect.id, "not asked for beside the other terms")
+        for held in start.end.fit.model.terms
+        if held.effect.key not in kept
+    )
+    grown = replace(start, end=end, steps=(*steps, *more), rest=rest)
+    return replace(grown, rejected=(*growth.rejected, *gone), last=screened(track, end), unhelped=growth, ended=True)

@@ -1,9 +1,9 @@
 """How sure each effect is there, whatever else stays unexplained: found alone in halves of the recordings, beside its rivals.
 
-The grown model is fitted to one half of the recordings with a term and without it, everything else fitted anew, and both are
-judged on the other half; and the other way round. What is there takes its part off either half. So the smaller of the two
-differences counts, as the logarithm of a likelihood ratio of so many values as what stays unexplained leaves independent.
-A rival fitted in full shares the probability by Bayes' rule.
+The grown model is fitted with a term and without it, everything else fitted anew. From there both are fitted to one half of the
+recordings, at first order, and judged on the other half; and the other way round. What is there takes its part off either half.
+So the smaller of the two differences counts, as the logarithm of a likelihood ratio of so many values as what stays unexplained
+leaves independent. A rival fitted in full shares the probability by Bayes' rule.
 
 What belongs to no law may be mended by the same wrong law in either half. So a law has to be asked for, too, where flexible
 functions of all other components of the machine are there (:mod:`.additive.asked`): what these explain as well is no evidence
@@ -24,8 +24,9 @@ from ..model import Model
 from .additive.asked import Asked
 from .additive.residual import independent_values
 from .calibration import Evidence, calibration
-from .candidates import scales_of
-from .fitting import bounds_of, free_names, refit, without_term
+from .fitting import refit
+from .least_squares import Fit
+from .screen import restraint
 from .settle import Step
 from .track import Track
 
@@ -33,6 +34,7 @@ __all__ = ["Half", "Presence", "presences"]
 
 _A_LITTLE = 0.1  # of a residual of the half that is judged on: it says what the other one tells hardly at all
 _ITERATIONS = 6
+_INFLATION = 2.0  # numerical: of what both halves leave, the most that one leaves in the other
 
 
 @dataclass(frozen=True)
@@ -81,30 +83,42 @@ def presences(
     n = left.shape[0]
     independent = independent_values(track, left)
     first = (np.arange(n) * 4 // n) % 2 == 0
-    with_all = [_on_other(track, end, rows) for rows in (first, ~first)]
+    state = refit(track, end, _ITERATIONS)
+    with_all = [_on_other(track, state.fit, rows) for rows in (first, ~first)]
     found: dict[str, Presence] = {}
-    asked = Asked(track, refit(track, end, _ITERATIONS))
+    asked = Asked(track, state)
     places = list(end.prefixes)
     for step in steps:
-        without = without_term(end, step.term.split("#")[0])
+        place = places.index(step.term)
+        without = asked.without(place)
         halves = []
-        for rows, (fitted, lacks) in zip((first, ~first), with_all, strict=True):
+        for rows, (values, lacks) in zip((first, ~first), with_all, strict=True):
             nats = 0.25 * independent * math.log(max(_on_other(track, without, rows)[1], 1e-300) / max(lacks, 1e-300))
-            own = {p.name: p.value for p in fitted.parameters() if p.name.startswith(f"{step.term}.")}
-            halves.append(Half(nats, own))
+            halves.append(Half(nats, {name: value for name, value in values.items() if name.startswith(f"{step.term}.")}))
         least = min(each.nats for each in halves)
-        functions = asked.nats(places.index(step.term))
+        functions = asked.nats(place)
         evidence = Evidence(shares[step.term], unexplained, least, functions, _among_rivals(step, independent))
         sure = calibration().probability(step.term.split("#")[0], evidence)
         found[step.term] = Presence(round(sure, 4), (halves[0], halves[1]), evidence)
     return found
 
 
-def _on_other(track: Track, model: Model, rows: NDArray[np.bool_]) -> tuple[Model, float]:
-    """``model`` fitted to the half ``rows``, and the sum of squares that it lacks in the other one [F^2]."""
+def _on_other(track: Track, fit: Fit, rows: NDArray[np.bool_]) -> tuple[dict[str, float], float]:
+    """Values of the parameters of ``fit`` from the half ``rows`` alone, and what it lacks in the other one then [F^2].
+
+    At first order from where it is fitted to both halves; what a bound holds stays there.
+    """
+    used = fit.solution.free
     weights = np.where(rows, 1.0, _A_LITTLE)
-    fitted = track.fit(model, free_names(model), _ITERATIONS, bounds_of(model, scales_of(track)), weights).model
-    return fitted, float(np.sum(track.residual(fitted)[~rows] ** 2))
+    jacobian = fit.jacobian[:, used]
+    normal = jacobian.T @ (weights[:, None] ** 2 * jacobian) + restraint(track, fit) * np.eye(jacobian.shape[1])
+    change = np.linalg.solve(normal, -jacobian.T @ (weights**2 * fit.residual))
+    values = {p.name: p.value for p in fit.model.parameters()}
+    for name, moved in zip(np.array(fit.names)[used].tolist(), (change * fit.scale[used]).tolist(), strict=True):
+        values[name] += moved
+    left = (fit.residual + jacobian @ change)[~rows]
+    # Where first order leads far away, fits to both halves are the better guess.
+    return values, min(float(left @ left), _INFLATION * float(fit.residual[~rows] @ fit.residual[~rows]))
 
 
 def _among_rivals(step: Step, independent: float) -> float:

@@ -8,9 +8,14 @@ first-order change of the others is wrong by.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
-from ..fitting import State, refit, without_place
+from ...record import Array
+from ..candidates import scales_of
+from ..fitting import State, bounds_of, free_names, without_place
+from ..least_squares import Fit
 from ..track import Track
 from .evidence import Grouped
 from .residual import ALIKE, functions_of, independent_share
@@ -31,20 +36,33 @@ class Asked:
 
     def __init__(self, track: Track, state: State) -> None:
         self._track, self._state = track, state
-        self._groups, self._rows, _ = functions_of(track, state)
+        self._withouts: dict[int, Fit] = {}
+
+    @cached_property
+    def _functions(self) -> tuple[dict[str, Array], slice]:
+        groups, rows, _ = functions_of(self._track, self._state)
+        return groups, rows
+
+    def without(self, place: int) -> Fit:
+        """The model without its term number ``place``, everything else fitted anew."""
+        if place not in self._withouts:
+            model = without_place(self._state.fit.model, place)
+            bounds = bounds_of(model, scales_of(self._track))
+            self._withouts[place] = self._track.fit(model, free_names(model), _ITERATIONS, bounds)
+        return self._withouts[place]
 
     def nats(self, place: int) -> float:
         """Evidence for the term number ``place`` of the model, the dependence of the rows counted [nats]."""
         fit = self._state.fit
-        without = refit(self._track, without_place(fit.model, place), _ITERATIONS).fit
-        change = (without.residual - fit.residual)[self._rows, None]
+        without, (groups, rows) = self.without(place), self._functions
+        change = (without.residual - fit.residual)[rows, None]
         size = float(np.sqrt(np.mean(change**2)))
         if size == 0.0:
             return 0.0
-        grouped = Grouped(without.residual[self._rows], without.jacobian[self._rows], {**self._groups, _TERM: change / size})
-        likeness = {name: grouped.likeness(_TERM, name) for name in self._groups}
+        grouped = Grouped(without.residual[rows], without.jacobian[rows], {**groups, _TERM: change / size})
+        likeness = {name: grouped.likeness(_TERM, name) for name in groups}
         own = max(likeness, key=lambda name: likeness[name])
-        beside = [name for name in self._groups if name != own or likeness[name] < ALIKE]
+        beside = [name for name in groups if name != own or likeness[name] < ALIKE]
         before = grouped.weighed(beside)
         start = dict(zip(before.groups, before.sizes, strict=True))
         after = grouped.weighed([*beside, _TERM], start, float(np.log(before.noise / grouped.size)))

@@ -3,10 +3,10 @@
 Each law is weighed beside flexible functions of all other components (:mod:`.forms`), so that it has only its own part to
 explain, however many others are missing. Fitted alone it may explain little: what the others lack lies over it. So the most
 probable law of every component comes at the same time, everything is fitted together, and then each has to earn its place: the
-one that is missed least goes, everything else is fitted anew, and so on (backward elimination). Where all together leave hardly
-anything, how much a law is missed is what unseen blocks lack without it. Where they leave more, it is the evidence for it beside
-flexible functions of the other components: of a law that is small beside what none explains, nothing can be seen otherwise. What
-is then left is taken apart again, until nothing comes that stays.
+one that is missed least goes, everything else is fitted anew, and so on (backward elimination). A law is missed by what unseen
+blocks lack without it, where all together leave hardly anything. Where they leave more, it is the evidence for it beside
+flexible functions of the other components: of a law that is small beside what none explains, nothing can be seen otherwise.
+What is then left is taken apart again, until nothing comes that stays.
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ __all__ = ["grown_together", "middle_of"]
 _BANDWIDTH = 140.0  # physical [rad/s]: about 22 Hz, where most axes' friction shows and their structures don't yet ring
 _WORTH = 5.0  # statistical, nats: odds of about 150 to one, for a law to be fitted in full
 _GAIN = 10.0  # statistical, nats, for a law to stay: beyond what four parameters take off by chance
+_LESSER = 0.05  # statistical, of the evidence for the strongest law: how well first order tells what others there are
 _PLAUSIBLE = 0.3  # probability among the laws of its component
-_ROUNDS = 4  # numerical: in each at least one term comes
-_ROUNDS_BESIDE = 2  # numerical: the second mends what the first has taken for something else
+_ROUNDS = 6  # numerical: in each at least one term comes
+_ROUNDS_BESIDE = 3  # numerical: what comes later mends what the first has taken for something else
 _TO_WEIGH = 8  # numerical, iterations from where everything fits
 
 
@@ -40,7 +41,9 @@ def middle_of(tracks: Sequence[Track]) -> Track:
     return min(tracks, key=lambda each: abs(math.log(each.bandwidth / _BANDWIDTH)))
 
 
-def grown_together(track: Track, begin: State, tell: Callable[[str], None], beside_unknown: bool = False) -> State:
+def grown_together(
+    track: Track, begin: State, tell: Callable[[str], None], beside_unknown: bool = False, state: State | None = None
+) -> State:
     """The model of ``begin`` with the laws that its components ask for, fitted.
 
     Args:
@@ -48,8 +51,9 @@ def grown_together(track: Track, begin: State, tell: Callable[[str], None], besi
         begin: the fitted model that lacks something.
         tell: told what comes and goes.
         beside_unknown: what is left is known to be explained by no law.
+        state: the same with laws that have come before and have to earn their place, too; None: without.
     """
-    state = begin
+    state = state or begin
     for _ in range(_ROUNDS_BESIDE if beside_unknown else _ROUNDS):
         if state.excess < NOTHING * state.floor:
             break
@@ -82,7 +86,11 @@ def _fitted(track: Track, state: State, offered: Sequence[Form], tell: Callable[
 
 
 def _offered(state: State, forms: list[Form]) -> Iterator[Form]:
-    """The law with the most evidence of every component, as far as they can be in one model."""
+    """The law with the most evidence of every component, as far as they can be in one model.
+
+    What the strongest is short of at first order shows as something small in other components: it has to come first.
+    """
+    worth = max(_WORTH, _LESSER * max((form.nats for form in forms), default=0.0))
     taken: set[str] = set()
     held = [term.effect for term in state.fit.model.terms]
     for form in forms:
@@ -93,7 +101,7 @@ def _offered(state: State, forms: list[Form]) -> Iterator[Form]:
         )
         there = any(each.id == effect.id for each in held) and not effect.repeatable
         if (
-            form.nats > _WORTH
+            form.nats > worth
             and form.probability >= _PLAUSIBLE
             and form.component not in taken
             and not (slips or moved or there)
@@ -124,15 +132,19 @@ def _pruned(track: Track, state: State, begin: State, independent: float, tell: 
 
 
 def _asked_for(track: Track, state: State, begin: State, tell: Callable[[str], None]) -> State:
-    """``state`` without the terms that nothing asks for beside flexible functions, the one with the least evidence first."""
-    while True:
+    """``state`` without the terms that nothing asks for beside flexible functions, the least needed at first order first."""
+    going = True
+    while going:
+        going = False
         asked = Asked(track, state)
-        nats = {k: asked.nats(k) for k in added(begin.fit.model, state.fit.model)}
-        least = min(nats, key=lambda k: nats[k], default=-1)
-        if least < 0 or nats[least] >= _GAIN:
-            return state
-        tell(f"not asked for: {state.fit.model.terms[least].effect.title} ({nats[least]:.1f} nats)")
-        state = refit(track, without_place(state.fit.model, least), _TO_WEIGH)
+        left = {k: _left_without(track, state, k) for k in added(begin.fit.model, state.fit.model)}
+        for place in sorted(left, key=lambda k: left[k]):
+            nats = asked.nats(place)
+            if nats < _GAIN:
+                tell(f"not asked for: {state.fit.model.terms[place].effect.title} ({nats:.1f} nats)")
+                state, going = refit(track, asked.without(place).model, _TO_WEIGH), True
+                break
+    return state
 
 
 def _left_without(track: Track, state: State, place: int) -> float:
