@@ -18,7 +18,7 @@ from .fitting import NOTHING, best_track, refit, without_term
 from .growth import AGAIN, FAINTLY, LITTLE, Growth, share_left
 from .moves import reconsidered
 from .price import implausible
-from .settle import CLEARLY, Step, audit
+from .settle import CLEARLY, HOPELESS, Step, audit
 from .track import Track
 
 __all__ = ["first_terms", "grow", "grown_faster", "leaves_much", "with_moves"]
@@ -100,7 +100,7 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
         tell: told what is done.
     """
     left = growth.end.excess
-    if not growth.steps or left < max(NOTHING * growth.end.floor, LITTLE * growth.begin.excess):
+    if not growth.steps or left < max(NOTHING * growth.end.floor, LITTLE * growth.begin.excess) or growth.rest > HOPELESS:
         return growth
     tell("reconsidering its laws and values")
     state = reconsidered(growth.track, growth.begin, growth.end, tell)

@@ -22,6 +22,7 @@ from .universe import worth_trying
 __all__ = [
     "CLEARLY",
     "FLOOR_KNOWN",
+    "HOPELESS",
     "NEARLY_ALL",
     "TO_STAY",
     "Settled",
@@ -33,6 +34,8 @@ __all__ = [
     "settled",
 ]
 
+HOPELESS = 0.3
+"""Statistical, of what is missing: with more left, no exchange of a term or of its law makes an explanation."""
 TO_STAY = 0.004
 """Statistical, of what is missing at the start: less is no gain beside all other terms."""
 NEARLY_ALL = 0.9  # of what little is left: what takes that is an effect, and not what laws that differ in form leave,
@@ -43,7 +46,6 @@ _TWINS = 2
 _COMPARABLE = 0.5  # of what a term explains, for a rival to take its place, however plausible that is
 _A_LITTLE = 0.1
 _WORSE = "made what it was not fitted to worse"
-_HOPELESS = 0.5  # of what is missing: with more left, no exchange of a term makes an explanation
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,7 @@ def settled(track: Track, begin: State, state: State, steps: list[Step]) -> Sett
 
 def exchanged(track: Track, done: Settled) -> Settled:
     """Each term against its rivals with all the others there, where several explain most together."""
-    if len(done.steps) < 2 or done.rest > _HOPELESS:
+    if len(done.steps) < 2 or done.rest > HOPELESS:
         return done
     state, steps = _exchanged(track, done.begin, done.state, list(done.steps), scales_of(track))
     state, steps, gone = _pruned(track, done.begin, state, steps)
