@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fric.diagnosis.additive.evidence import Grouped
+from fric.diagnosis.additive.residual import lines_of
 from fric.diagnosis.additive.together import grown_together, middle_of
 from fric.diagnosis.additive.told import by_component
 from fric.diagnosis.fitting import refit
 from fric.diagnosis.start import started
 from fric.model import build_model, term
 from fric.record import Record
-from scipy.optimize import approx_fprime
+from scipy.optimize import approx_fprime, minimize
 from scipy.stats import multivariate_normal
 
 
@@ -26,14 +27,14 @@ def grouped() -> Grouped:
 def test_the_evidence_is_the_normal_density_of_what_the_base_leaves(grouped: Grouped) -> None:
     z = np.array([-0.3, -1.2, -1.0])
     gram, load = grouped._gram, grouped._load
-    value, gradient = grouped._negative(z, gram, load, grouped._selected(("one", "two"))[1], 2)
+    value, gradient, _ = grouped._negative(z, gram, load, grouped._selected(("one", "two"))[1])
     owner = np.repeat([0, 1], [3, 5])
     covariance = (grouped.x * np.exp(2.0 * z[owner])) @ grouped.x.T + np.exp(2.0 * z[2]) * np.eye(60)
     # In the 58 directions that the base leaves open.
     left = np.linalg.svd(grouped._basis, full_matrices=True)[0][:, 2:]
     density = multivariate_normal(np.zeros(58), left.T @ covariance @ left).logpdf(left.T @ grouped.y)
     assert -value == pytest.approx(density, abs=1e-6)
-    numeric = approx_fprime(z, lambda at: grouped._negative(at, gram, load, owner, 2)[0], 1e-6)
+    numeric = approx_fprime(z, lambda at: grouped._negative(at, gram, load, owner)[0], 1e-6)
     np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-4)
 
 
@@ -109,3 +110,57 @@ def test_what_is_missing_shows_in_its_component() -> None:
     assert first.laws[0].explained > 0.8
     assert "N rms goes with friction over time; slow drift of friction" in first.sentence("N")
     assert all(0.0 <= each.presence <= 1.0 and 0.0 <= each.share <= 1.0 for each in found)
+
+
+def test_the_evidence_is_as_large_as_another_optimiser_finds_it() -> None:
+    random = np.random.default_rng(11)
+    for size in (0.05, 0.6):
+        groups = {name: np.cumsum(random.standard_normal((600, k)), axis=0) for name, k in (("a", 5), ("b", 9), ("c", 20))}
+        y = size * groups["b"] @ random.standard_normal(9) + random.standard_normal(600)
+        grouped = Grouped(y, np.ones((600, 1)), groups)
+        found = grouped.weighed(grouped.names)
+        index, owner = grouped._selected(grouped.names)
+        gram, load = grouped._gram[np.ix_(index, index)], grouped._load[index]
+
+        def cost(z: np.ndarray, gram: np.ndarray, load: np.ndarray, owner: np.ndarray, grouped: Grouped) -> float:
+            return float(grouped._negative(np.clip(z, -8.0, 2.0), gram, load, owner)[0])
+
+        others = [
+            minimize(
+                cost, begin, (gram, load, owner, grouped), method="Nelder-Mead", options={"maxiter": 4000, "xatol": 1e-5}
+            ).fun
+            for begin in ([-1.0, -1.0, -1.0, -1.0], [-3.0, 0.0, -3.0, -2.0])
+        ]
+        assert found.log_evidence > -min(others) - 0.05
+
+
+def test_gradient_and_expected_curvature_of_the_evidence() -> None:
+    random = np.random.default_rng(12)
+    groups = {name: random.standard_normal((80, k)) for name, k in (("a", 3), ("b", 6))}
+    z = np.log([0.7, 0.4, 0.5])
+    curvatures, step = [], 1e-4
+    for _ in range(400):
+        y = 0.7 * groups["a"] @ random.standard_normal(3) + 0.4 * groups["b"] @ random.standard_normal(6)
+        grouped = Grouped(y + 0.5 * random.standard_normal(80), np.zeros((80, 0)), groups)
+        index, owner = grouped._selected(grouped.names)
+        given = grouped._gram[np.ix_(index, index)], grouped._load[index], owner
+        # In units of the data's own size, and with columns of size one.
+        at = z + np.log([grouped._sizes["a"], grouped._sizes["b"], 1.0]) - np.log(grouped.size)
+        value, gradient, expected = grouped._negative(at, *given)
+        ends = [[grouped._negative(at + s * step * np.eye(3)[k], *given) for s in (-1.0, 1.0)] for k in range(3)]
+        slopes = [(after[0] - before[0]) / (2.0 * step) for before, after in ends]
+        assert gradient == pytest.approx(slopes, rel=1e-4, abs=1e-4 * abs(value))
+        curvatures.append(np.array([(after[1] - before[1]) / (2.0 * step) for before, after in ends]) - expected)
+    apart, spread = np.mean(curvatures, axis=0), np.std(curvatures, axis=0) / np.sqrt(len(curvatures))
+    assert np.all(np.abs(apart) < 4.0 * spread + 0.05)
+
+
+def test_a_line_between_two_whole_numbers_of_cycles_is_found() -> None:
+    place, cycles = np.linspace(0.0, 1.0, 4000, endpoint=False), np.arange(4.0, 121.0)
+    for true in (98.4, 31.5, 7.2):
+        target = 0.9 * np.sin(2.0 * np.pi * true * place + 0.4) + 0.4 * np.cos(2.0 * np.pi * 55.0 * place)
+        angle = 2.0 * np.pi * place[:, None] * cycles
+        fitted = np.linalg.lstsq(np.concatenate([np.cos(angle), np.sin(angle)], axis=1), target, rcond=None)[0]
+        first, second, *_ = lines_of(cycles, *np.split(fitted, 2))
+        assert first == pytest.approx(true, abs=0.15)
+        assert second == pytest.approx(55.0, abs=0.15)

@@ -26,6 +26,7 @@ from fric.simulation import Simulator
 VOCABULARY = {
     *("coulomb", "viscous", "quadratic_drag", "stribeck", "asymmetry", "presliding", "frictional_lag", "dwell_time"),
     *("load_dependence", "position_dependence", "time_drift", "temperature", "accel_hysteresis", "bias", "ripple"),
+    *("shear_thinning", "gear_friction"),
     *("backlash", "impact_backlash", "compliance", "stiffness", "nonlinear_stiffness"),
     *("actuator_lag", "delay", "saturation", "input_deadzone", "unknown"),
 }

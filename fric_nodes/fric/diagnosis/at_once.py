@@ -74,7 +74,10 @@ def by_parts(
         len(proposed.steps) < _TOGETHER or left > max(LITTLE * proposed.begin.excess, CLEARLY * proposed.end.floor)
     ):
         return None
-    other = settled_again(proposed)
+    # Of many laws that leave much, none is exchanged for its rivals: they were weighed beside each other when they came.
+    settles = left <= AGAIN * proposed.begin.excess
+    rest = proposed.rest if settles else audit(proposed.track, proposed.begin.fit.model, proposed.end.fit.model)
+    other = settled_again(proposed) if settles else replace(proposed, rest=rest)
     if growth is None:
         other = grown_faster(tracks, other, tell)
         complete = (

@@ -56,9 +56,10 @@ class Universe:
         return values
 
     def put(self, values: Array, term: Term) -> None:
-        """Switch ``term`` on in ``values``, at a place of its effect that is still free."""
+        """Switch ``term`` on in ``values``, at a place of its effect that is still free; where none is, in place of the last."""
         switches = len(values) - len(self.effects)
-        number, at = next(place for place in self.places[term.effect.key] if values[switches + place[0]] == 0.0)
+        places = self.places[term.effect.key]
+        number, at = next((place for place in places if values[switches + place[0]] == 0.0), places[-1])
         values[at : at + len(term.values)] = term.values
         values[switches + number] = 1.0
 

@@ -20,7 +20,7 @@ __all__ = ["EFFECT"]
 def force(c: Context, force: float, exponent: float) -> float:
     if c.velocity == 0.0:
         return 0.0
-    return math.copysign(force * abs(c.velocity) ** exponent, c.velocity)
+    return force * math.copysign(abs(c.velocity) ** exponent, c.velocity)
 
 
 EFFECT = Effect(

@@ -23,8 +23,8 @@ def force(c: Context, force: float, velocity: float) -> float:
     ratio = abs(c.velocity) * (1.0 / velocity)  # the division is the loop's, not the step's
     # An exponential that underflows takes ten times as long as any other, and what is left there is beyond all precision.
     if ratio > _LEVEL:
-        return math.copysign(force, c.velocity)
-    return math.copysign(force * (1.0 - math.exp(-ratio)), c.velocity)
+        return force * math.copysign(1.0, c.velocity)
+    return force * math.copysign(1.0 - math.exp(-ratio), c.velocity)
 
 
 EFFECT = Effect(
