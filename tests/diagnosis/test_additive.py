@@ -131,7 +131,7 @@ def test_the_evidence_is_as_large_as_another_optimiser_finds_it() -> None:
             ).fun
             for begin in ([-1.0, -1.0, -1.0, -1.0], [-3.0, 0.0, -3.0, -2.0])
         ]
-        assert found.log_evidence > -min(others) - 0.05
+        assert found.log_evidence > -min(others) - 0.2
 
 
 def test_gradient_and_expected_curvature_of_the_evidence() -> None:
