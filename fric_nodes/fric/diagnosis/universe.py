@@ -56,7 +56,7 @@ class Universe:
         return values
 
     def put(self, values: Array, term: Term) -> None:
-        """Switch ``term`` on in ``values``, at a place of its effect that is still free; where none is, in place of the last."""
+        """Switch ``term`` on in ``values``, at a free place of its effect; where none is free, in place of the last."""
         switches = len(values) - len(self.effects)
         places = self.places[term.effect.key]
         number, at = next((place for place in places if values[switches + place[0]] == 0.0), places[-1])
