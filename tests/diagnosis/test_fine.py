@@ -36,6 +36,7 @@ def test_an_axis_that_hardly_moves_has_none() -> None:
     assert fine_periods(np.linspace(0.0, 1.0, 100), np.ones(100), 24.0, 30.0) == []
 
 
+@pytest.mark.long
 def test_the_balls_of_a_screw_are_found() -> None:
     """80 cycles over the travel, beyond every period that is tried one by one."""
     known = [term("coulomb", force=20.0), term("viscous", coefficient=120.0)]

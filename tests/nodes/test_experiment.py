@@ -165,7 +165,7 @@ def test_a_controller_that_is_begun_anew_before_it_answered_is_asked_again(graph
     assert pid.settings.number("kp") == 2.0
 
 
-@pytest.mark.parametrize("lock_step", [True, False])
+@pytest.mark.parametrize("lock_step", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_a_signal_leaves_the_drive_without_force(graph: Graph, lock_step: bool) -> None:
     hearer = Hearer(graph, StampedForce if lock_step else Float64)
     out = graph.folder / "found"

@@ -33,6 +33,7 @@ _LONG = {
     "steady-curves",
     "stick-slip",
     "tensor-product",
+    "transmission",
 }
 
 
