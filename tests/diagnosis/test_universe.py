@@ -32,6 +32,12 @@ def test_every_term_acts(name: str) -> None:
     assert needed == pytest.approx(predict_force(model, t, q, v, a, h), rel=1e-9)
 
 
+def test_a_transmission_has_no_place_that_no_term_takes() -> None:
+    links = [term("compliance", stiffness=stiffness, damping=1.0) for stiffness in (1e4, 2e4)]
+    model = build_model("rigid", {"mass": 2.0, "load_share": 0.5}, links)
+    assert len(universe_of(model).places["compliance/linear"]) == len(links)
+
+
 def test_one_more_fits_beside_those_that_are_there() -> None:
     model = models()["1 ripples"]
     universe = universe_of(model)

@@ -75,7 +75,7 @@ def by_parts(
     ):
         return None
     # Of many laws that leave much, none is exchanged for its rivals: they were weighed beside each other when they came.
-    settles = left <= AGAIN * proposed.begin.excess
+    settles = growth is None or left <= AGAIN * proposed.begin.excess
     rest = proposed.rest if settles else audit(proposed.track, proposed.begin.fit.model, proposed.end.fit.model)
     other = settled_again(proposed) if settles else replace(proposed, rest=rest)
     if growth is None:

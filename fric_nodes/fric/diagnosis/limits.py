@@ -21,9 +21,9 @@ from ..effect import Effect
 from ..effects import EFFECTS
 from ..model import ModelError, Term
 from ..record import Array, Units
-from .additive.residual import OWN, independent_values
+from .additive.residual import independent_values
 from .fitting import State
-from .screen import Column, Tried
+from .screen import OWN, Column, Tried
 from .track import Track
 
 __all__ = ["EVIDENCE", "Limit", "limits_of"]
@@ -110,7 +110,7 @@ class _Search:
     def needed(self, column: Array) -> float | None:
         """By what a column has to be multiplied; None where the fitted parameters do the same."""
         own = self.own(column)
-        return None if own <= max(OWN * float(column @ column), _TINY) else math.sqrt(self.energy / own)
+        return None if own <= max(OWN**2 * float(column @ column), _TINY) else math.sqrt(self.energy / own)
 
     def own(self, column: Array) -> float:
         """Energy of what the fitted parameters can't do of a column [F^2]."""

@@ -28,6 +28,7 @@ from .least_squares import Fit
 from .track import Track
 
 __all__ = [
+    "OWN",
     "SEEN",
     "SLOWLY",
     "Column",
@@ -45,8 +46,12 @@ _BLOCKS = 10
 _KEPT = 2  # trials of a candidate that go from the quick columns to the observer's
 _TINY = 1e-10
 _VISIBLE = 1e-12  # of what is missing, the least that a trial changes
-_OWN = 0.02  # of a column, what the fit's own parameters must not be able to do
 _PAIRS = 5
+OWN = 0.02
+"""Numerical, of a column's size: what all other parameters must leave of it, or else it is them by another name.
+
+Friction that levels off with speed is Coulomb and viscous friction but for a tenth of its size, and is seen all the same.
+"""
 SEEN = 1.5
 """Numerical, times the observer's bandwidth: forces with a higher frequency hardly come through."""
 SLOWLY = 0.25
@@ -211,7 +216,7 @@ class Promise:
         whole = np.linalg.norm(columns, axis=0)
         columns = columns - self._basis @ (self._basis.T @ columns)
         size = np.linalg.norm(columns, axis=0)
-        if not np.all(np.isfinite(size)) or np.max(size) <= _OWN * np.max(whole):
+        if not np.all(np.isfinite(size)) or np.max(size) <= OWN * np.max(whole):
             return 0.0  # the fit's own parameters do the same
         own, _ = np.linalg.qr(columns / np.maximum(size, 1e-300))
         return float(np.sum((own.T @ self._missing) ** 2))

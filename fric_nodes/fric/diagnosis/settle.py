@@ -34,7 +34,7 @@ __all__ = [
     "settled",
 ]
 
-HOPELESS = 0.3
+HOPELESS = 0.5
 """Statistical, of what is missing: with more left, no exchange of a term or of its law makes an explanation."""
 TO_STAY = 0.004
 """Statistical, of what is missing at the start: less is no gain beside all other terms."""

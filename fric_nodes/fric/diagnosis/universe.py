@@ -96,10 +96,12 @@ def worth_trying() -> tuple[Effect, ...]:
 
 
 def universe_of(model: Model) -> Universe:
-    """The structure that holds the common effects and every term of ``model``, and one more of what may come again."""
+    """The structure that holds the common effects and every term of ``model``, and one more of what may be absent."""
     common = {effect.key for effect in common_effects()}
     own = [held.effect.key for held in model.terms if held.effect.key not in common]
-    for key, count in Counter(held.effect.key for held in model.terms if held.effect.repeatable).items():
+    # Not of what can't be absent: a place that no term takes would act.
+    several = Counter(held.effect.key for held in model.terms if held.effect.repeatable and held.effect.key in common)
+    for key, count in several.items():
         own += [key] * max(count + 1 - _PLACES, 0)
     return _universe(model.plant, tuple(sorted(own)))
 

@@ -16,14 +16,13 @@ from ..along import Along as Quick
 from ..candidates import candidates, place_of, scales_of
 from ..fitting import State
 from ..motion import along
-from ..screen import SEEN, SLOWLY, Column, Promise, columns_of
+from ..screen import OWN, SEEN, SLOWLY, Column, Promise, columns_of
 from ..track import Track
 from .components import BY_ID, COMB, COMPONENTS, OTHER_OF, OTHERS, Along, Component, Ranges, comb_cycles
 from .evidence import Grouped, Weighed
 
 __all__ = [
     "ALIKE",
-    "OWN",
     "PRESENT",
     "Additive",
     "Presence",
@@ -38,12 +37,6 @@ PRESENT = 0.5
 
 ALIKE = 0.5
 """Statistical, share of a law's energy that a component's function explains: from this on, the law belongs to the component."""
-
-OWN = 5e-4
-"""Numerical, share of a law's energy that all other parameters leave: with less, it is them by another name.
-
-Friction that levels off with speed is Coulomb and viscous friction but for a hundredth of its energy, and is seen all the same.
-"""
 
 _THIN = 1.0  # times 1/w, from row to row: what an observer sees is smooth over about two of these
 _ROUNDS = 15  # iterations from the sizes that hold with all components
@@ -197,7 +190,7 @@ def _places(state: State, rows: slice, groups: dict[str, Array], laws: Sequence[
     grouped = Grouped(state.fit.residual[rows], state.fit.jacobian[rows], {**groups, **named})
     places = {}
     for k, (column, _) in enumerate(laws):
-        if grouped.own(f"law {k}") < OWN:
+        if grouped.own(f"law {k}") < OWN**2:
             continue  # the fitted parameters do the same
         likeness = {each: grouped.likeness(f"law {k}", each) for each in groups}
         best = max(likeness, key=lambda each: likeness[each])

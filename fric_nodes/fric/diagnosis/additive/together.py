@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from ...model import Model
 from ..fitting import NOTHING, State, added, refit, unseen, without_place
 from ..growth import LITTLE
 from ..settle import CLEARLY
@@ -25,6 +26,9 @@ from .forms import Form, forms_of
 from .residual import additive
 
 __all__ = ["grown_together", "middle_of"]
+
+Weighed = Callable[[State], Callable[[int], tuple[float, Model]]]
+"""For a fitted model and the place of a term: the nats that speak for the term, and the model without it."""
 
 _BANDWIDTH = 140.0  # physical [rad/s]: about 22 Hz, where most axes' friction shows and their structures don't yet ring
 _WORTH = 5.0  # statistical, nats: odds of about 150 to one, for a law to be fitted in full
@@ -64,7 +68,8 @@ def grown_together(
             break
         whole = _fitted(track, state, offered, tell)
         partial = beside_unknown or whole.excess > max(LITTLE * begin.excess, CLEARLY * whole.floor)
-        grown = _asked_for(track, whole, begin, tell) if partial else _pruned(track, whole, begin, independent, tell)
+        weighed = _beside_functions(track) if partial else _by_unseen_blocks(track, independent)
+        grown = _pruned(track, whole, begin, weighed, tell)
         if _nats(state, grown, independent) < (0.0 if partial else _GAIN) or _same(state, grown):
             break
         tell(f"leaves {100.0 * grown.excess / max(begin.excess, 1e-300):.0f} % of what was missing")
@@ -115,36 +120,43 @@ def _same(one: State, other: State) -> bool:
     return [held.effect.key for held in one.fit.model.terms] == [held.effect.key for held in other.fit.model.terms]
 
 
-def _pruned(track: Track, state: State, begin: State, independent: float, tell: Callable[[str], None]) -> State:
-    """``state`` without the terms that unseen blocks don't ask for, the least needed at first order first."""
+def _pruned(track: Track, state: State, begin: State, weighed: Weighed, tell: Callable[[str], None]) -> State:
+    """``state`` without the terms for which ``weighed`` finds too little, the least needed at first order first."""
     going = True
     while going:
         going = False
+        weigh = weighed(state)
         left = {k: _left_without(track, state, k) for k in added(begin.fit.model, state.fit.model)}
         for place in sorted(left, key=lambda k: left[k]):
-            without = refit(track, without_place(state.fit.model, place), _TO_WEIGH)
-            nats = _nats(without, state, independent)
+            nats, without = weigh(place)
             if nats < _GAIN:
                 tell(f"not needed: {state.fit.model.terms[place].effect.title} ({nats:.1f} nats)")
-                state, going = without, True
+                state, going = refit(track, without, _TO_WEIGH), True
                 break
     return state
 
 
-def _asked_for(track: Track, state: State, begin: State, tell: Callable[[str], None]) -> State:
-    """``state`` without the terms that nothing asks for beside flexible functions, the least needed at first order first."""
-    going = True
-    while going:
-        going = False
+def _by_unseen_blocks(track: Track, independent: float) -> Weighed:
+    """Weighs a term by what unseen blocks lack without it, of ``independent`` values."""
+
+    def of(state: State) -> Callable[[int], tuple[float, Model]]:
+        def weigh(place: int) -> tuple[float, Model]:
+            without = refit(track, without_place(state.fit.model, place), _TO_WEIGH)
+            return _nats(without, state, independent), without.fit.model
+
+        return weigh
+
+    return of
+
+
+def _beside_functions(track: Track) -> Weighed:
+    """Weighs a term by the evidence for it beside flexible functions of the other components."""
+
+    def of(state: State) -> Callable[[int], tuple[float, Model]]:
         asked = Asked(track, state)
-        left = {k: _left_without(track, state, k) for k in added(begin.fit.model, state.fit.model)}
-        for place in sorted(left, key=lambda k: left[k]):
-            nats = asked.nats(place)
-            if nats < _GAIN:
-                tell(f"not asked for: {state.fit.model.terms[place].effect.title} ({nats:.1f} nats)")
-                state, going = refit(track, asked.without(place).model, _TO_WEIGH), True
-                break
-    return state
+        return lambda place: (asked.nats(place), asked.without(place).model)
+
+    return of
 
 
 def _left_without(track: Track, state: State, place: int) -> float:
