@@ -16,6 +16,7 @@ import numpy as np
 from .effect import Effect, Place
 from .effects import EFFECTS, by_name
 from .engine.compile import Loops, loops_for
+from .engine.linked import Linked, linked, linked_loops
 from .errors import InputError
 from .parameter import Parameter
 from .plant import Plant
@@ -155,9 +156,22 @@ class Model:
         """The compiled loops of this structure; the first call in a fresh cache compiles."""
         return loops_for(self.plant, [held.effect for held in self.terms])
 
-    def inner_states(self, velocity: float = 0.0) -> tuple[Array, Array]:
-        """States of the slip dynamics and memory of all terms at the start of a run, with ``velocity`` [x/s]."""
-        slip = [held.effect.start(held.values) for held in self.terms if held.effect.slip is not None]
+    @property
+    def linked_loops(self) -> Loops:
+        """Loops compiled once for all structures, which take :attr:`linked` for values; where many structures are tried."""
+        return linked_loops(self.plant, [held.effect for held in self.terms])
+
+    @property
+    def linked(self) -> Linked:
+        """Values and functions of the model as :attr:`linked_loops` take them."""
+        return linked(self.plant, self.plant_values, self.terms)
+
+    def inner_states(self, velocity: float = 0.0, force: float = 0.0) -> tuple[Array, Array]:
+        """States of the slip dynamics and memory of all terms at the start of a run.
+
+        It begins with ``velocity`` [x/s], and under ``force`` [F] at the contact where that is known.
+        """
+        slip = [held.effect.start(held.values, force) for held in self.terms if held.effect.slip is not None]
         memory = [held.effect.memory(velocity) for held in self.terms]
         return slip[0] if slip else np.zeros(0), np.concatenate([np.zeros(0), *memory])
 

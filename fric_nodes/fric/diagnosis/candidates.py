@@ -24,7 +24,7 @@ from ..plants import PLANTS
 from ..record import Array
 from .motion import smooth
 from .track import Track
-from .universe import worth_trying
+from .worth_trying import worth_trying
 
 __all__ = ["FRICTION", "Candidate", "Scales", "candidates", "fewest_cycles", "scales_of"]
 

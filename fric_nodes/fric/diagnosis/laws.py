@@ -1,6 +1,6 @@
 """The law of an effect that has been found: the usual one, or another that explains much more.
 
-An effect is found by the one of its laws that comes nearest to all others (:func:`fric.diagnosis.universe.worth_trying`).
+An effect is found by the one of its laws that comes nearest to all others (:func:`fric.diagnosis.worth_trying.worth_trying`).
 The machine may follow another: bristles that bend elastically up to a sharp corner instead of an exponential, say. What that
 leaves would bring further effects in that only mend the form of the first. So each other law is fitted in the place of the
 usual one, everything else anew, and takes it if it leaves much less on unseen blocks. The effect, its rivals and its place stay

@@ -19,9 +19,8 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from ..identification.innovations import Run
-from ..model import Model, Term
+from ..model import Model
 from ..record import Array
-from .universe import universe_of
 
 __all__ = ["SMOOTH", "Motion", "Past", "along", "motion_of", "smooth"]
 
@@ -78,7 +77,6 @@ def along(
     motion: Motion,
     velocity: Array,
     states: tuple[Array, Array],
-    extra: Term | None = None,
 ) -> Array:
     """The force [F] that ``model`` needs along a ``motion``, shape ``(n,)``.
 
@@ -89,15 +87,10 @@ def along(
         motion: positions and accelerations in their middle.
         velocity: there [x/s], shape ``(n,)``; it may differ from that of ``motion``, for example in its sign at rest.
         states: the model's inner states at the beginning; they are updated in place to those at the end.
-        extra: a term beside those of the model.
     """
-    universe = universe_of(model)
-    values = universe.values(model)
-    if extra is not None:
-        universe.put(values, extra)
     needed, friction = np.empty_like(velocity), np.empty_like(velocity)
-    universe.loops.predict(
-        values, time - 0.5 * motion.step, motion.position, velocity, motion.acceleration,
+    model.linked_loops.predict(
+        model.linked, time - 0.5 * motion.step, motion.position, velocity, motion.acceleration,
         motion.step, run.load, run.temperature, *states, needed, friction,
     )  # fmt: skip
     return needed

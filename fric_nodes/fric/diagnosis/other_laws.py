@@ -11,7 +11,7 @@ from ..effects import EFFECTS
 from ..model import Term
 from ..parameter import Parameter
 from .candidates import Scales
-from .universe import worth_trying
+from .worth_trying import worth_trying
 
 __all__ = ["laws_beside", "laws_further", "strained", "told"]
 

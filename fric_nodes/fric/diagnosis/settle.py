@@ -17,7 +17,7 @@ from .rivals import rivals_of
 from .screen import Tried, screen
 from .track import Track, Twin
 from .twin import twins
-from .universe import worth_trying
+from .worth_trying import worth_trying
 
 __all__ = [
     "CLEARLY",

@@ -42,7 +42,6 @@ from ..threads import n_threads
 from .least_squares import Bounds, Fit, fitted_values
 from .motion import Motion, along, motion_of
 from .runs import SMOOTH_LED, Runs
-from .universe import universe_of
 
 __all__ = ["STEP_OF_RATE", "Track", "Twin"]
 
@@ -106,8 +105,7 @@ class Track(Runs):
 
     def _followed(self, model: Model, mass: float | None, twin: Twin | None = None) -> Array:
         """The force that ``model`` lacks, pushed by the impulses of ``mass``; where that is None its position is set [F]."""
-        universe = universe_of(model)
-        values, plant_values = universe.values(model), np.array(model.plant_values)
+        loops, linked, plant_values = model.linked_loops, model.linked, np.array(model.plant_values)
         inertia = model.total_inertia
         parts = []
         for k, whole in enumerate(self.runs):
@@ -117,15 +115,15 @@ class Track(Runs):
             extra = _NOTHING if twin is None else twin.extras[k][first:]
             position = run.position if twin is None else twin.positions[k][first:]
             alpha, beta = self.gains(whole)
-            state = np.append(universe.plant.start(plant_values, *run.start), self.begin(k, first))
+            state = np.append(model.plant.start(plant_values, *run.start), self.begin(k, first))
             found = np.zeros(n)
             around = run.step, self.n_substeps(model, whole), run.load, run.temperature, alpha, beta
             last = state, *self.inner_states(model, k, run.start[1]), found[first:]
             if mass is None:
-                universe.loops.observe(values, effort, position, *around, self.noise[k], *last)
+                loops.observe(linked, effort, position, *around, self.noise[k], *last)
             else:
                 gain = min(mass / inertia, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
-                universe.loops.pursue(values, effort, extra, position, *around, gain, self.noise[k], *last)
+                loops.pursue(linked, effort, extra, position, *around, gain, self.noise[k], *last)
             with np.errstate(over="ignore"):  # a model that escapes has no number for it
                 parts.append((inertia if mass is None else mass) * beta / whole.sample_time**2 * found)
         return self._finite(self.joined(parts))
@@ -164,11 +162,14 @@ class Track(Runs):
 
     def needed(self, model: Model, extra: Term | None = None) -> Array:
         """As :meth:`residual`, by the force that ``model``, with the term ``extra``, needs along the measured motion [F]."""
+        given_by_path = self._applied(model)
+        if extra is not None:
+            model = model.with_terms((*model.terms, extra))
         motion = self.raw_motion if model.has_slip_dynamics else self.motion
         found = []
-        for k, (run, time, each, given) in enumerate(zip(self.runs, self.time, motion, self._applied(model), strict=True)):
+        for k, (run, time, each, given) in enumerate(zip(self.runs, self.time, motion, given_by_path, strict=True)):
             states = self.inner_states(model, k, float(each.velocity[0]))
-            found.append(along(model, run, time, each, each.velocity, states, extra) - given)
+            found.append(along(model, run, time, each, each.velocity, states) - given)
         return self._finite(self.seen(found))
 
     def _finite(self, signal: Array) -> Array:
@@ -195,9 +196,9 @@ class Track(Runs):
         run = self.runs[k] if past is None else past.run
         force = float(np.median(run.effort[:_FIRST])) if model.plant.led else 0.0
         if past is None or not _remembers(model):
-            return universe_of(model).inner_states(model, velocity, force)
+            return model.inner_states(velocity, force)
         motion = past.raw_motion if model.has_slip_dynamics else past.motion
-        states = universe_of(model).inner_states(model, float(motion.velocity[0]), force)
+        states = model.inner_states(float(motion.velocity[0]), force)
         along(model, past.run, past.time, motion, motion.velocity, states)
         return states
 

@@ -19,7 +19,6 @@ from ..record import Array
 from ..signals.resolution import noise_of, step_of
 from .motion import SMOOTH, smooth
 from .track import Track, Twin
-from .universe import universe_of
 
 __all__ = ["twins"]
 
@@ -32,7 +31,7 @@ _STIFFEST, _MOST_DAMPING = 0.15, 0.6
 
 def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
     """Position at the end of each interval, force that leads, and command over it, of ``model`` led along the run's motion."""
-    universe, run = universe_of(model), track.runs[k]
+    run = track.runs[k]
     step = run.sample_time
     if model.plant.led:
         motion = track.led_motion[k]
@@ -43,14 +42,14 @@ def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
     rate = np.gradient(wanted, step)
     lead = min(_LED * track.bandwidth, 0.3 / step)
     plant_values = np.array(model.plant_values)
-    seen = min(track.mass, universe.plant.seen_inertia(*plant_values))
+    seen = min(track.mass, model.plant.seen_inertia(*plant_values))
     stiffness = min(track.mass * lead**2, _STIFFEST * seen / step**2)
     damping = min(2.0 * track.mass * lead, _MOST_DAMPING * seen / step)
-    state = np.append(universe.plant.start(plant_values, float(wanted[0]), float(rate[0])), track.begin(k))
+    state = np.append(model.plant.start(plant_values, float(wanted[0]), float(rate[0])), track.begin(k))
     given = smooth(run.effort, step, SMOOTH * track.bandwidth)
     there, extra = np.empty_like(given), np.empty_like(given)
-    universe.loops.lead(
-        universe.values(model), given,
+    model.linked_loops.lead(
+        model.linked, given,
         wanted[:-1].copy(), rate[:-1].copy(), run.step, track.n_substeps(model, run), run.load, run.temperature,
         stiffness, damping, state, *track.inner_states(model, k, float(rate[0])), there, extra,
     )  # fmt: skip

@@ -38,10 +38,10 @@ from ..record import Array
 from . import loops
 from .kernel import kernel
 
-__all__ = ["Loops", "loops_for"]
+__all__ = ["IMPORTS", "Loops", "fingerprint", "imported", "loops_for", "plain", "with_work_space"]
 
 # What the texts of plants and loops may name besides the model's own functions.
-_IMPORTS = (
+IMPORTS = (
     "import math",
     "from typing import Any",
     "from fric.engine.assembled import Inner, Surroundings",
@@ -73,25 +73,18 @@ class Loops:
     fan: Callable[..., None]
 
 
-def loops_for(plant: Plant, effects: Sequence[Effect], switched: bool = False) -> Loops:
-    """The compiled loops for ``plant`` with ``effects`` in this order.
-
-    Args:
-        plant: what moves.
-        effects: its terms.
-        switched: give every effect that can be absent a switch: the values end with one number per effect then, and an effect
-            whose number is 0 costs no more than the look at it.
-    """
-    return _loops_for(plant, tuple(effects), switched)
+def loops_for(plant: Plant, effects: Sequence[Effect]) -> Loops:
+    """The compiled loops for ``plant`` with ``effects`` in this order."""
+    return _loops_for(plant, tuple(effects))
 
 
 @lru_cache(maxsize=256)
-def _loops_for(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> Loops:
-    source = _source(plant, effects, switched)
-    module = _import(source, _fingerprint(plant, effects, source))
+def _loops_for(plant: Plant, effects: tuple[Effect, ...]) -> Loops:
+    source = _source(plant, effects)
+    module = imported(source, fingerprint(effects, source))
     n_constants = _counter(plant, effects)
     names = [function.__name__ for function in loops.LOOPS]
-    return Loops(*(_with_work_space(getattr(module, name), n_constants) for name in names))
+    return Loops(*(with_work_space(getattr(module, name), n_constants) for name in names))
 
 
 def _counter(plant: Plant, effects: tuple[Effect, ...]) -> Callable[[Array], int]:
@@ -111,7 +104,7 @@ def _counter(plant: Plant, effects: tuple[Effect, ...]) -> Callable[[Array], int
     return count
 
 
-def _with_work_space(loop: Callable[..., None], n_constants: Callable[[Array], int]) -> Callable[..., None]:
+def with_work_space(loop: Callable[..., None], n_constants: Callable[[Any], int]) -> Callable[..., None]:
     """``loop`` with its work space, the last arguments, made anew for each call, so that threads don't meet."""
     parameters = list(inspect.signature(getattr(loop, "py_func", loop)).parameters)
     if "z" not in parameters:
@@ -128,8 +121,8 @@ def _with_work_space(loop: Callable[..., None], n_constants: Callable[[Array], i
 class _Assembly:
     """The bodies of a model's functions, grown effect by effect; see :mod:`fric.engine.assembled` for what each is."""
 
-    def __init__(self, at: int, switches: str | None) -> None:
-        self.imports: list[str] = list(_IMPORTS)
+    def __init__(self, at: int) -> None:
+        self.imports: list[str] = list(IMPORTS)
         self.level: list[str] = []
         self.force: list[str] = []
         self.remember: list[str] = []
@@ -141,8 +134,6 @@ class _Assembly:
         self.play: list[str] = []
         self.prepare: list[str] = []
         self._at = at
-        self._switches = switches
-        self._bits: dict[Effect, int] = {}
         self._memory = 0
 
     def add(self, number: int, effect: Effect) -> None:
@@ -153,13 +144,8 @@ class _Assembly:
             self.imports.append(f"from {function.__module__} import {function.__name__} as {role}_{number}")
 
         def call(role: str, *first: str) -> str:
-            return f"{role}_{number}({', '.join((*first, *given))})"
+            return f"{role}_{number}({', '.join((*first, *parameters))})"
 
-        switch, given = "", parameters
-        if self._switches is not None and effect.neutral is not None:
-            switch = f"if {self._switches} & {1 << number}: "
-            given = [f"hidden({each})" for each in parameters]
-            self._bits[effect] = self._bits.get(effect, 0) | 1 << number
         if effect.uses_acceleration:
             self.bending.append(effect)
         if effect.uses_push:
@@ -168,27 +154,21 @@ class _Assembly:
             self.remembering.append(effect)
         kept = (str(self._memory),) if effect.n_memory else ()
         if effect.remember is not None:
-            self.remember.append(f"    {switch}{call('remember', 'c', 'total' if effect.level else '0.0', *kept)}")
+            self.remember.append(f"    {call('remember', 'c', 'total' if effect.level else '0.0', *kept)}")
         if effect.level is not None:
-            line = f"    {switch}total = {call('level', 'c', 'total', *kept)}"
+            line = f"    total = {call('level', 'c', 'total', *kept)}"
             self.level.append(line)
             self.remember.append(line)
         if effect.force is not None:
-            self.force.append(f"    {switch}total += {call('force', 'c', *kept)}")
+            self.force.append(f"    total += {call('force', 'c', *kept)}")
         if effect.command is not None:
-            self.command.append(f"    {switch}u = {call('command', 'u', 'h', 'memory', str(self._memory))}")
+            self.command.append(f"    u = {call('command', 'u', 'h', 'memory', str(self._memory))}")
         if effect.play is not None:
             self.play.append(f"    total += {call('play')}")
         constants = self._prepare(call) if effect.prepare is not None else ()
         if effect.slip is not None:
             self.slip = f"    return {call('slip', 'z', 'z_next', '0', 'v', 'h', 'level', *constants)}"
         self._memory += effect.n_memory
-
-    def any_of(self, effects: Sequence[Effect]) -> str:
-        """Condition under which one of ``effects`` is there."""
-        if not all(effect in self._bits for effect in effects):
-            return "True"
-        return f"{self._switches} & {sum(self._bits[effect] for effect in set(effects))} != 0" if effects else "False"
 
     def _prepare(self, call: Callable[..., str]) -> tuple[str, str]:
         # At most one term has constants, since only slip dynamics take them: its offset is 0.
@@ -207,11 +187,10 @@ def _links(effects: tuple[Effect, ...], at: int) -> list[str]:
     return lines[False] or lines[True]
 
 
-def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
+def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
     """Text of the module that binds the structure's functions together."""
     n_parameters = len(plant.parameters) + sum(len(effect.parameters) for effect in effects)
-    # Switches are bits of one number, which stays in a register: every term is looked at several times in a step.
-    parts = _Assembly(len(plant.parameters), f"p[{n_parameters}]" if switched else None)
+    parts = _Assembly(len(plant.parameters))
     for number, effect in enumerate(effects):
         parts.add(number, effect)
     lines = [
@@ -224,13 +203,13 @@ def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
         f"MEMORY = {any(effect.remember is not None for effect in effects)}",
         f"N_STATES = {len(plant.states)}",
         f"SEEN, SEEN_RATE = {plant.encoder}",
-        *_unpacking(n_parameters, len(effects) if switched else 0),
+        f"@kernel\ndef unpacked(p):\n    return ({''.join(f'p[{k}], ' for k in range(n_parameters))})",
         "@kernel\ndef bends(p):",
-        f"    return {parts.any_of(parts.bending)}",
+        f"    return {bool(parts.bending)}",
         "@kernel\ndef pushed(p):",
-        f"    return {parts.any_of(parts.pushed)}",
+        f"    return {bool(parts.pushed)}",
         "@kernel\ndef remembers(p):",
-        f"    return {parts.any_of(parts.remembering)}",
+        f"    return {bool(parts.remembering)}",
         *_summing("level_sum(c, p)", parts.level),
         "@kernel\ndef level(c, p):",
         "    return max(level_sum(c, p), 0.0)",
@@ -249,21 +228,11 @@ def _source(plant: Plant, effects: tuple[Effect, ...], switched: bool) -> str:
         "    return u",
         "@kernel\ndef prepare(p, constants):",
         *(parts.prepare or ["    pass"]),
-        *(inspect.getsource(_plain(function)) for function in plant.functions),
-        inspect.getsource(_plain(loops.advance)),
+        *(inspect.getsource(plain(function)) for function in plant.functions),
+        inspect.getsource(plain(loops.advance)),
         *("@loop\n" + inspect.getsource(function) for function in loops.LOOPS),
     ]
     return "\n".join(lines)
-
-
-def _unpacking(n_parameters: int, n_switches: int) -> list[str]:
-    """A function that makes a tuple of the parameters and, where there are switches, a whole number with a bit for each."""
-    assert n_switches < 63
-    lines = [f"    if p[{n_parameters + k}] != 0.0: there |= {1 << k}" for k in range(n_switches)]
-    values = "".join(f"p[{k}], " for k in range(n_parameters))
-    if not lines:
-        return ["@kernel\ndef unpacked(p):", f"    return ({values})"]
-    return ["@kernel\ndef unpacked(p):", "    there = 0", *lines, f"    return ({values}there)"]
 
 
 def _summing(head: str, body: list[str]) -> list[str]:
@@ -274,15 +243,15 @@ def _summing(head: str, body: list[str]) -> list[str]:
     return [f"@kernel\ndef {head}:", "    total = -0.0", *body, "    return total"]
 
 
-def _plain(function: Callable[..., Any]) -> Callable[..., Any]:
+def plain(function: Callable[..., Any]) -> Callable[..., Any]:
     """The Python function under a compiled one."""
     return cast(Callable[..., Any], getattr(function, "py_func", function))
 
 
-def _fingerprint(plant: Plant, effects: tuple[Effect, ...], source: str) -> str:
-    """Hash of all that the machine code depends on: the text, and every module whose compiled functions it calls."""
+def fingerprint(effects: tuple[Effect, ...], source: str, *others: str) -> str:
+    """Hash of all that the machine code depends on: the text, the modules whose compiled functions it calls, and ``others``."""
     digest = hashlib.sha256()
-    modules = {Effect.__module__, kernel.__module__, loops.__name__}
+    modules = {Effect.__module__, kernel.__module__, loops.__name__, *others}
     waiting = {f.__module__ for effect in effects for f in effect.functions.values()}
     while waiting:
         name = waiting.pop()
@@ -315,7 +284,7 @@ def _cache_folder() -> Path:
     return folder
 
 
-def _import(source: str, fingerprint: str) -> ModuleType:
+def imported(source: str, fingerprint: str) -> ModuleType:
     """The module with this source, stored under its fingerprint and imported from there."""
     name = f"fric_assembled_{fingerprint}"
     path = _cache_folder() / f"{name}.py"

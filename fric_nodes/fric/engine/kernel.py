@@ -19,7 +19,7 @@ from numba.core.options import DefaultOptions
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
-__all__ = ["hidden", "kernel", "local_array", "loop"]
+__all__ = ["COMMON", "UNWRAPPED", "array_over", "hidden", "kernel", "local_array", "loop"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -27,9 +27,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # The counting is numba's only option without a documented name; where a version has it no longer, it is only slower.
 _UNCOUNTED = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 # Neither have those that leave out the ways into a function from Python and from C.
-_UNWRAPPED = {name: True for name in ("no_cpython_wrapper", "no_cfunc_wrapper") if hasattr(DefaultOptions, name)}
-_COMMON: dict[str, Any] = {"error_model": "numpy", "nogil": True, **_UNCOUNTED}
-_TAKEN_IN: dict[str, Any] = {**_COMMON, **_UNWRAPPED, "forceinline": True}
+UNWRAPPED = {name: True for name in ("no_cpython_wrapper", "no_cfunc_wrapper") if hasattr(DefaultOptions, name)}
+COMMON: dict[str, Any] = {"error_model": "numpy", "nogil": True, **_UNCOUNTED}
+"""Options of every compiled function."""
+
+_TAKEN_IN: dict[str, Any] = {**COMMON, **UNWRAPPED, "forceinline": True}
 
 
 class _Kernel(CPUDispatcher):
@@ -37,7 +39,7 @@ class _Kernel(CPUDispatcher):
 
     def __call__(self, *arguments: Any) -> Any:
         if "from_python" not in self.__dict__:
-            self.__dict__["from_python"] = njit(**_COMMON)(self.py_func)
+            self.__dict__["from_python"] = njit(**COMMON)(self.py_func)
         return self.__dict__["from_python"](*arguments)
 
 
@@ -53,7 +55,22 @@ def kernel(function: Function) -> Function:
 
 def loop(function: Function) -> Function:
     """``function`` as a loop over steps, compiled at its first call or taken from the disk cache of its module."""
-    return cast(Function, njit(**_COMMON, cache=True)(function))
+    return cast(Function, njit(**COMMON, cache=True)(function))
+
+
+def array_over(context: Any, builder: Any, numbers: Any, length: int) -> Any:
+    """Code that makes an array of the ``length`` numbers at a pointer, which it doesn't own."""
+    index = context.get_value_type(types.intp)
+    made = context.make_array(types.Array(types.float64, 1, "C"))(context, builder)
+    context.populate_array(
+        made,
+        data=numbers,
+        shape=[ir.Constant(index, length)],
+        strides=[ir.Constant(index, 8)],
+        itemsize=ir.Constant(index, 8),
+        meminfo=None,
+    )
+    return made._getvalue()
 
 
 def _local_array(typing_context: Any, n: Any) -> Any:
@@ -63,18 +80,9 @@ def _local_array(typing_context: Any, n: Any) -> Any:
     array = types.Array(types.float64, 1, "C")
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        number, index = context.get_value_type(types.float64), context.get_value_type(types.intp)
+        number = context.get_value_type(types.float64)
         memory = cast(Any, cgutils).alloca_once(builder, ir.ArrayType(number, max(length, 1)))
-        made = context.make_array(array)(context, builder)
-        context.populate_array(
-            made,
-            data=builder.bitcast(memory, number.as_pointer()),
-            shape=[ir.Constant(index, length)],
-            strides=[ir.Constant(index, 8)],
-            itemsize=ir.Constant(index, 8),
-            meminfo=None,
-        )
-        return made._getvalue()
+        return array_over(context, builder, builder.bitcast(memory, number.as_pointer()), length)
 
     return array(n), code
 
