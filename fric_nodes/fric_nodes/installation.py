@@ -65,10 +65,10 @@ def _versions() -> Item:
 
 
 def _cache() -> Item:
-    from fric.engine.compile import _cache_folder as cache_folder
+    from fric.engine.compile import cache_folder
 
-    folder = cache_folder()
-    if folder.name.startswith("fric-"):
+    folder, kept = cache_folder()
+    if not kept:
         detail = f"no folder for compiled models can be written: they go to {folder}, for this process only"
         return Item("cache", "warning", detail, "set FRIC_CACHE_DIR to a folder that can be written")
     free = os.statvfs(folder).f_bavail * os.statvfs(folder).f_frsize if hasattr(os, "statvfs") else 1 << 40

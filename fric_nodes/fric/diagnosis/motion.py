@@ -101,8 +101,8 @@ def smooth(signal: Array, step: float, cutoff: float) -> Array:
     edge = cutoff * step / math.pi
     if edge >= 0.9:
         return signal
-    result: Array = sosfiltfilt(butter(2, edge, output="sos"), signal)
-    return result
+    # scipy hands back a view that runs backwards: compiled loops would be compiled for that once more.
+    return np.ascontiguousarray(sosfiltfilt(butter(2, edge, output="sos"), signal))
 
 
 def motion_of(run: Run, cutoff: float) -> Motion:

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numba
 import numpy as np
@@ -38,7 +38,17 @@ from ..record import Array
 from . import loops
 from .kernel import kernel
 
-__all__ = ["IMPORTS", "Loops", "fingerprint", "imported", "loops_for", "plain", "with_work_space"]
+__all__ = [
+    "IMPORTS",
+    "CacheFolder",
+    "Loops",
+    "cache_folder",
+    "fingerprint",
+    "imported",
+    "loops_for",
+    "plain",
+    "with_work_space",
+]
 
 # What the texts of plants and loops may name besides the model's own functions.
 IMPORTS = (
@@ -265,8 +275,15 @@ def fingerprint(effects: tuple[Effect, ...], source: str, *others: str) -> str:
     return digest.hexdigest()[:24]
 
 
+class CacheFolder(NamedTuple):
+    """Where compiled code lies, and whether it stays there when the process ends."""
+
+    path: Path
+    kept: bool
+
+
 @lru_cache(maxsize=1)
-def _cache_folder() -> Path:
+def cache_folder() -> CacheFolder:
     """The first of the candidate folders that can be written."""
     candidates = [os.environ.get("FRIC_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME"), str(Path.home() / ".cache")]
     for number, candidate in enumerate(candidates):
@@ -276,18 +293,18 @@ def _cache_folder() -> Path:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
-                return folder
+                return CacheFolder(folder, kept=True)
         except OSError:
             continue
     folder = Path(tempfile.mkdtemp(prefix="fric-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
+    return CacheFolder(folder, kept=False)
 
 
 def imported(source: str, fingerprint: str) -> ModuleType:
     """The module with this source, stored under its fingerprint and imported from there."""
     name = f"fric_assembled_{fingerprint}"
-    path = _cache_folder() / f"{name}.py"
+    path = cache_folder().path / f"{name}.py"
     if not path.exists():
         # Written aside and renamed, so that another process never sees half a file.
         with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False, encoding="utf-8") as file:

@@ -31,7 +31,7 @@ from .compile import IMPORTS, Loops, fingerprint, imported, plain, with_work_spa
 from .kernel import kernel
 from .pointers import call_linked, entry
 
-__all__ = ["Linked", "chain", "linked", "linked_loops"]
+__all__ = ["Linked", "chain", "compile_effect", "compile_loop", "linked", "linked_loops", "text_of"]
 
 # Chains of the table, each with the number of its first row and of the one behind its last.
 _CHAINS = ("level", "force", "remember", "command", "play", "link")
@@ -252,3 +252,33 @@ def _source(plant: Plant, rigid: bool, elastic: bool) -> str:
         *("@loop\n" + inspect.getsource(function) for function in loops.LOOPS if function is not loops.fan),
     ]
     return "\n".join(lines)
+
+
+def compile_effect(effect: Effect) -> None:
+    """Compile the functions of ``effect``, or find them on disk."""
+    _functions(effect)
+
+
+def compile_loop(plant: Plant, rigid: bool, elastic: bool, name: str) -> None:
+    """Compile one of the loops that a diagnosis runs, or find it on disk.
+
+    Args:
+        plant: kind of plant.
+        rigid: no term has slip dynamics.
+        elastic: the transmission gives a force.
+        name: ``pursue``, ``lead``, ``predict`` or ``observe``.
+    """
+    none, begin = np.zeros(0), np.zeros(len(plant.states) + 1)
+    signals: dict[str, tuple[Any, ...]] = {
+        "pursue": (none, none, none, none, 1, none, none, 0.0, 0.0, 0.0, 0.0, begin, none, none, none),
+        "observe": (none, none, none, 1, none, none, 0.0, 0.0, 0.0, begin, none, none, none),
+        "lead": (none, none, none, none, 1, none, none, 0.0, 0.0, begin, none, none, none, none),
+        "predict": (none, none, none, none, 0.0, none, none, none, none, none, none),
+    }
+    empty = Linked(np.zeros(len(plant.parameters)), np.zeros(_HEAD, dtype=np.int64))
+    getattr(_loops(plant, rigid, elastic), name)(empty, *signals[name])
+
+
+def text_of(plant: Plant) -> str:
+    """What the loops of ``plant`` are made from, to tell whether they have changed."""
+    return "\n".join(_source(plant, rigid, elastic) for rigid in (True, False) for elastic in (True, False))

@@ -50,6 +50,7 @@ def diagnose(
 ) -> None:
     """Find which physical effects a model leaves out, and write report.html, report.json, model.yaml and prediction.csv."""
     import fric
+    from fric.compiling import compiled_beside
     from fric.model_file import read_model
 
     given = validate or []
@@ -61,8 +62,9 @@ def diagnose(
     nominal = read_model(model)
     results = results.claimed(_RECORD, _FILES)
     progress(f"reading {len(train) + len(given)} recording(s)")
-    records, kept_apart = (read_all(paths, reading, as_recorded=True) for paths in (train, given))
-    found = fric.diagnose(records, nominal, validate=kept_apart, blocks=blocks, progress=progress)
+    with compiled_beside():
+        records, kept_apart = (read_all(paths, reading, as_recorded=True) for paths in (train, given))
+        found = fric.diagnose(records, nominal, validate=kept_apart, blocks=blocks, progress=progress)
     results.write(_RECORD, found.files())
     if results.as_json:
         typer.echo(json.dumps(found.to_dict()))
