@@ -40,7 +40,7 @@ def together(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None
     track, begin = found or (middle := middle_of(tracks), refit(middle, nominal))
     end = grown_together(track, begin, tell)
     steps = _steps_to(track, nominal, end)
-    return Growth(track, begin, end, steps, (), end.excess / max(begin.excess, 1e-300), ended=True)
+    return Growth(track, begin, end, steps, (), end.excess / max(begin.excess, 1e-300), ended=True, together=end)
 
 
 def _steps_to(track: Track, before: Model, end: State) -> tuple[Step, ...]:
@@ -121,11 +121,14 @@ def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None])
         growth: that leaves more than an explanation does.
         tell: told what comes.
     """
-    tell("looking for what helps beside it")
     track = growth.track
     found = fast_observer(tracks, growth.begin.fit.model)
+    faster = found is not None and found[0].bandwidth > track.bandwidth
+    if growth.together is growth.end and not faster:
+        return growth  # it is what growing together came to: once more it would come to the same
+    tell("looking for what helps beside it")
     start = replace(growth, beyond=0.0)
-    if found is not None and found[0].bandwidth > track.bandwidth:
+    if found is not None and faster:
         track, begin = found
         end = refit(track, growth.end.fit.model)
         rest = audit(track, begin.fit.model, end.fit.model) if growth.steps else 1.0

@@ -53,6 +53,7 @@ class Growth:
         ended: False where more terms may help.
         beyond: share that nothing explains to a faster observer, where a slower one was taken instead; else 0.
         unhelped: the same before terms came that only help beside something unknown; None where none did.
+        together: what growing by several terms at once ended with; None where that wasn't done.
     """
 
     track: Track
@@ -66,6 +67,7 @@ class Growth:
     ended: bool = False
     beyond: float = 0.0
     unhelped: Growth | None = None
+    together: State | None = None
 
     @property
     def price(self) -> float:
