@@ -1,9 +1,10 @@
 """Effects concealed in recordings of a real axis: the diagnosis examined on its own motions, noise and unknown physics.
 
 A force that opposes the motion more than it did needs that much more effort for the same motion, exactly: what is added to the
-recorded effort is a law of the measured motion, and nothing of the recording's own dirt is lost. A delay of the drive is the
-recorded effort ahead of its time. The recording as it is stands beside: what is found there is the axis's own and counts
-neither way.
+recorded effort is a law of the measured motion, and nothing of the recording's own dirt is lost. A delay of the drive is
+the recorded effort ahead of its time, a lag the recorded effort with as much of its slope as the lag takes off, and
+friction of a gear asks for more of the effort that drives and for less of the effort that brakes. The recording as it is
+stands beside: what is found there is the axis's own and counts neither way.
 
 The size of an effect is a multiple of what the grown model of the recording as it is leaves unexplained, as root mean square of
 the added force where it acts.
@@ -24,7 +25,7 @@ from ..confidence import AS_LIKELY
 from ..diagnose import diagnose
 from ..result import Diagnosis
 
-__all__ = ["INJECTED", "Injected", "InjectionOutcome", "examined", "injected", "injections"]
+__all__ = ["CHANGED", "INJECTED", "Injected", "InjectionOutcome", "examined", "injected", "injections"]
 
 _CUTOFF = 40.0  # physical [Hz]: where axes' friction changes with their motion
 _REST = 0.01  # physical, of fast motion: below, the axis may rest, where friction balances whatever is left
@@ -58,11 +59,41 @@ INJECTED: dict[str, Callable[[Motion], Array]] = {
     "position_dependence": _bump,
     "stiffness": lambda s: (s.position - s.low) / (s.high - s.low),
     "nonlinear_stiffness": lambda s: ((s.position - 0.5 * (s.low + s.high)) / (s.high - s.low)) ** 3,
+    "shear_thinning": lambda s: (1.0 - np.exp(-np.abs(s.velocity) / (0.1 * s.fast))) * s.sign,
     "time_drift": lambda s: (s.time - s.time[0]) / (s.time[-1] - s.time[0]) * s.sign,
 }
 """Forces along the motion, of the size of one, by the effect of the vocabulary that they are."""
 
-_DELAY = "delay"
+
+@dataclass(frozen=True)
+class Changed:
+    """An effect that changes the effort itself.
+
+    Attributes:
+        slope: what a small one adds, of the size of one [F], from the recording and its motion, shape ``(n,)``.
+        effort: the whole effort with one of the given size [F], shape ``(n,)``.
+    """
+
+    slope: Callable[[Record, Motion], Array]
+    effort: Callable[[Record, Motion, float], Array]
+
+
+def _later(record: Record, motion: Motion) -> Array:
+    """What changes per second of delay or lag [F/s]."""
+    return np.asarray(np.gradient(record.effort, record.time), dtype=np.float64)
+
+
+def _geared(record: Record, motion: Motion, size: float) -> Array:
+    """The effort of which friction of ``size`` times itself leaves the recorded one."""
+    return record.effort / (1.0 - size * motion.sign * np.sign(record.effort))
+
+
+CHANGED: dict[str, Changed] = {
+    "delay": Changed(_later, lambda record, motion, size: np.interp(record.time + size, record.time, record.effort)),
+    "actuator_lag": Changed(_later, lambda record, motion, size: record.effort + size * _later(record, motion)),
+    "gear_friction": Changed(lambda record, motion: np.abs(record.effort) * motion.sign, _geared),
+}
+"""Those that are no force along the motion."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +133,7 @@ class InjectionOutcome:
 
 def injections(sizes: Sequence[float]) -> list[Injected]:
     """Every effect in every size."""
-    return [Injected(effect, size) for effect in (*INJECTED, _DELAY) for size in sizes]
+    return [Injected(effect, size) for effect in (*INJECTED, *CHANGED) for size in sizes]
 
 
 def injected(records: Sequence[Record], what: Injected, rest: float) -> tuple[list[Record], float]:
@@ -117,20 +148,20 @@ def injected(records: Sequence[Record], what: Injected, rest: float) -> tuple[li
     fast = float(np.quantile(np.abs(np.concatenate([each.velocity for each in motions])), _FAST))
     low = min(float(np.min(each.position)) for each in motions)
     high = max(float(np.max(each.position)) for each in motions)
-    made = []
+    moved, made = [], []
     for record, each in zip(records, motions, strict=True):
         sign = np.where(np.abs(each.velocity) > _REST * fast, np.sign(each.velocity), 0.0)
         motion = replace(each, sign=sign, fast=fast, low=low, high=high)
-        made.append(_later(record) if what.effect == _DELAY else INJECTED[what.effect](motion))
+        moved.append(motion)
+        changing = CHANGED.get(what.effect)
+        made.append(INJECTED[what.effect](motion) if changing is None else changing.slope(record, motion))
     joined = np.concatenate(made)
     acts = np.abs(joined) > _ACTS * float(np.max(np.abs(joined)))
     size = what.times * rest / float(np.sqrt(np.mean(joined[acts] ** 2)))
     changed = []
-    for record, force in zip(records, made, strict=True):
-        if what.effect == _DELAY:
-            effort = np.interp(record.time + size * record.sample_time, record.time, record.effort)
-        else:
-            effort = record.effort + size * force
+    for record, motion, force in zip(records, moved, made, strict=True):
+        changing = CHANGED.get(what.effect)
+        effort = record.effort + size * force if changing is None else changing.effort(record, motion, size)
         changed.append(replace(record, effort=effort))
     return changed, what.times * rest
 
@@ -181,9 +212,3 @@ def _motion(record: Record) -> Motion:
         position = sosfiltfilt(butter(2, _CUTOFF, fs=1.0 / h, output="sos"), position)
     velocity = np.gradient(position, record.time)
     return Motion(position, velocity, np.sign(velocity), record.time, 1.0, 0.0, 1.0)
-
-
-def _later(record: Record) -> Array:
-    """What a delay by one sample changes of the effort [F]."""
-    change: Array = np.gradient(record.effort)
-    return change
