@@ -26,6 +26,8 @@ from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import Typesdict
 
+from .rows import Rows
+
 __all__ = ["Block", "DecodeError", "decode", "layout_of"]
 
 _MANY_LAYOUTS = 64  # above this many layouts of one length, messages are decoded one by one
@@ -215,13 +217,11 @@ def decode(messages: Sequence[bytes], msgtype: str, types: Typesdict, encoding: 
     Raises:
         DecodeError: a message does not fit its type.
     """
-    lengths = np.fromiter(map(len, messages), dtype=np.intp, count=len(messages))
+    held = Rows.of(messages)
     blocks: list[Block] = []
-    for length in np.unique(lengths):
-        rows = np.flatnonzero(lengths == length)
-        same = messages if rows.size == len(messages) else [messages[row] for row in rows.tolist()]
-        table = np.frombuffer(b"".join(same), dtype=np.uint8).reshape(rows.size, int(length))
-        blocks += _split(rows, table, msgtype, types, encoding)
+    for length in np.unique(held.lengths):
+        rows = np.flatnonzero(held.lengths == length)
+        blocks += _split(rows, held.table(rows), msgtype, types, encoding)
     return blocks
 
 

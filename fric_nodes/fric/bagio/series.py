@@ -9,10 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..record import Array
+from .bulk_mcap import Gathered
 from .checks import Stamps, pick_joint, pick_topic
 from .decode import Block, DecodeError, decode
 from .errors import BagError, DamagedError
 from .joints import UnequalError, joint_fields, joint_names
+from .rows import Rows
 from .selection import SelectionError, select
 from .source import Source
 from .topics import Topic
@@ -62,11 +64,29 @@ class Messages(NamedTuple):
 
     topic: Topic
     log_ns: Stamps
-    data: list[bytes]
+    data: Rows
 
 
 def collect(source: Source, topics: Collection[Topic]) -> dict[str, Messages]:
     """Raw messages of topics, by name, in one pass over the bag or its window, each in the order of reception."""
+    whole = source.gathered({topic.name for topic in topics})
+    if whole is None:
+        whole = _one_by_one(source, topics)
+    found: dict[str, Messages] = {}
+    for topic in topics:
+        log_ns, messages = whole[topic.name]
+        if len(messages) != topic.n_messages and not source.recovered and source.window is None:
+            problem = f"is damaged ({len(messages)} of {topic.n_messages} messages of {topic.name} are where its index says)"
+            raise DamagedError(source.path, problem, "record again, or restore it from a copy")
+        if np.any(np.diff(log_ns) < 0):  # several recorder threads, or files out of order
+            order = np.argsort(log_ns, kind="stable")
+            log_ns, messages = log_ns[order], messages.taken(order)
+        found[topic.name] = Messages(topic, log_ns, messages)
+    return found
+
+
+def _one_by_one(source: Source, topics: Collection[Topic]) -> dict[str, Gathered]:
+    """As :meth:`.source.Source.gathered`, from one message after the other."""
     times: dict[str, list[int]] = {topic.name: [] for topic in topics}
     data: dict[str, list[bytes]] = {topic.name: [] for topic in topics}
     types = {topic.name: topic.msgtype for topic in topics}
@@ -74,18 +94,7 @@ def collect(source: Source, topics: Collection[Topic]) -> dict[str, Messages]:
         if types[name] == msgtype:
             times[name].append(log_time)
             data[name].append(raw)
-    found: dict[str, Messages] = {}
-    for topic in topics:
-        log_ns = np.array(times[topic.name], dtype=np.int64)
-        messages = data[topic.name]
-        if len(messages) != topic.n_messages and not source.recovered and source.window is None:
-            problem = f"is damaged ({len(messages)} of {topic.n_messages} messages of {topic.name} are where its index says)"
-            raise DamagedError(source.path, problem, "record again, or restore it from a copy")
-        if np.any(np.diff(log_ns) < 0):  # several recorder threads, or files out of order
-            order = np.argsort(log_ns, kind="stable")
-            log_ns, messages = log_ns[order], [messages[index] for index in order]
-        found[topic.name] = Messages(topic, log_ns, messages)
-    return found
+    return {name: Gathered(np.array(times[name], dtype=np.int64), Rows.of(data[name])) for name in times}
 
 
 def series(where: object, messages: Messages, joint: str | None = None, usual: str | None = None) -> Series:

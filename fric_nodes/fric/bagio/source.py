@@ -14,16 +14,21 @@ from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
+from typing import Any, cast
 
 import apsw
+import numpy as np
 from rosbags.rosbag2 import Reader, ReaderError
 from ruamel.yaml.error import YAMLError, YAMLStreamError
 
+from .bulk_mcap import Gathered, gathered
+from .bulk_sqlite import gathered_sqlite
 from .errors import BagError, DamagedError
 from .passing import Passing
 from .recover_mcap import McapScan, mcap_metadata
 from .recover_ros1 import Ros1Scan
 from .recover_sqlite import SqliteScan, has_journal, sqlite_metadata
+from .rows import Rows
 from .topics import Raw, Topic
 
 if sys.version_info >= (3, 14):
@@ -86,6 +91,7 @@ class Source:
         self._reader: Reader | None = None
         self._scans: list[McapScan | SqliteScan | Ros1Scan] = []
         self._passing = Passing(self._scans)
+        self._bulk: list[Path] = []  # storage files whose messages are stored as they are
         self._refusal = ""  # why the library does not read it
         files = self._find()
         try:
@@ -156,6 +162,21 @@ class Source:
         except _DAMAGE as error:
             raise DamagedError(self.path, f"is damaged ({error})", "record again, or restore it from a copy") from error
 
+    def gathered(self, topics: Collection[str]) -> dict[str, Gathered] | None:
+        """The messages of ``topics`` in the window, by their name, all at once; None where they come one after the other."""
+        several = len({topic.name for topic in self.topics}) < len(self.topics)  # types of one topic
+        if self._reader is None or not self._bulk or several:
+            return None
+        of_file = gathered if self.storage == "mcap" else gathered_sqlite
+        files = [of_file(file, topics, self.window) for file in self._bulk]
+        if any(file is None for file in files):
+            return None
+        parts = {topic: [file[topic] for file in files if file is not None] for topic in topics}
+        return {
+            topic: Gathered(np.concatenate([part.log_ns for part in of]), Rows.joined(part.data for part in of))
+            for topic, of in parts.items()
+        }
+
     def _find(self) -> list[Path]:
         path = self.path
         if not path.exists():
@@ -206,6 +227,9 @@ class Source:
             merged[x.topic, x.msgtype] = Topic(x.topic, x.msgtype, before + x.msgcount, x.msgdef)
         self.topics = tuple(merged.values())
         self.storage = _kind(files[0]) or ""
+        storage = cast(Any, reader.storage)
+        if not (in_order and storage.metadata.compression_mode):
+            self._bulk = [Path(each.path) for each in (storage.storages if in_order else [storage])]
         # rosbags has no public access to the custom data of a folder.
         custom = reader.storage.metadata.custom if in_order else None
         self.custom = dict(custom) if custom else self._stored_custom(files[0])
