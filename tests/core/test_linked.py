@@ -58,7 +58,11 @@ def simulated(model: Model, *, table: bool) -> Array:
     return found
 
 
-@pytest.mark.parametrize("name", MODELS)
+SLOW = ("no terms", "level, force and command", "elements", "spring", "stops", "acceleration")
+"""What others of the list hold as well, but for one more law."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long) if name in SLOW else name for name in MODELS])
 def test_the_motion_is_the_same(name: str) -> None:
     expected = simulated(MODELS[name], table=False)
     assert np.ptp(expected[:, 0]) > 1e-3
