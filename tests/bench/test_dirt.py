@@ -83,7 +83,7 @@ def test_every_method_has_a_trial() -> None:
     assert set(CASES) == set(METHODS)
 
 
-@pytest.mark.parametrize("method", ["forced-oscillation", "two-stage", "tensor-product"])
+@pytest.mark.parametrize("method", ["forced-oscillation", pytest.param("two-stage", marks=pytest.mark.long), "tensor-product"])
 def test_methods_that_need_motions_of_their_own(method: str) -> None:
     names = {"forced-oscillation": "mass", "two-stage": "presliding.stiffness_1", "tensor-product": "speeding up at 10 mm/s"}
     answers = [_Guarded(CASES[method])(seed) for seed in range(3)]

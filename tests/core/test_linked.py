@@ -58,7 +58,7 @@ def simulated(model: Model, *, table: bool) -> Array:
     return found
 
 
-SLOW = ("no terms", "level, force and command", "elements", "spring", "stops", "acceleration")
+SLOW = ("no terms", "level, force and command", "elements", "spring", "stops", "acceleration", "another plant")
 """What others of the list hold as well, but for one more law."""
 
 

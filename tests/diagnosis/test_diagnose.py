@@ -92,6 +92,7 @@ def test_beside_an_actuator_far_beyond_its_limit_the_other_effect_is_found() -> 
     assert max(float(np.max(np.abs(record.effort))) for record in case.train) > 4.0 * limit.value
 
 
+@pytest.mark.long
 def test_a_shaft_that_hardens_is_no_gap_with_soft_stops() -> None:
     case = draw(668952436, "moderate", "compliance", "form")
     found = diagnose(case.train, case.validation, case.nominal)

@@ -153,7 +153,14 @@ def test_other_forms_and_rates() -> None:
     assert double.train[0].sample_time in (pytest.approx(1 / 1000), pytest.approx(1 / 2000))
 
 
-@pytest.mark.parametrize("effect", [name for name, each in CONCEALED.items() if each.foreign])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        pytest.param(name, marks=pytest.mark.long) if name == "compliance" else name
+        for name, each in CONCEALED.items()
+        if each.foreign
+    ],
+)
 def test_laws_that_fric_has_not_are_drawn_too(effect: str) -> None:
     case = draw(11, "moderate", effect, "foreign")
     assert case.key["forms"][0] in CONCEALED[effect].foreign
@@ -163,6 +170,7 @@ def test_laws_that_fric_has_not_are_drawn_too(effect: str) -> None:
         assert _noe(case, case.key["true_structure"]) > 3.0 * case.key["noise_floor"]
 
 
+@pytest.mark.long
 def test_an_axis_that_swings_up_at_some_strength_of_an_effect_is_drawn_weaker() -> None:
     case = make(Order(73, 2031861075, "weak", ("actuator_lag",), "form"))
     assert 3.0 <= case.key["noe_refit"] / case.key["noise_floor"] <= 5.0

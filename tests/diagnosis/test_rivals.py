@@ -48,6 +48,7 @@ def test_what_has_passed_for_friction_leaves_it() -> None:
     assert with_room(build_model("rigid", {"mass": 2.0}, frictionless), [term("input_deadzone", width=1.0)]) == []
 
 
+@pytest.mark.long
 def test_a_mode_that_holds_most_of_the_mass_is_the_best_candidate() -> None:
     """First order sees little of it, where the trial rings long at another frequency than the machine does."""
     body, hung, frequency, damping, viscous = 0.8, 1.2, 55.0, 0.03, 40.0

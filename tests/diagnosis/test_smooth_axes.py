@@ -59,6 +59,7 @@ def test_a_hardening_spring_is_named_whatever_its_unit_makes_of_it() -> None:
     assert fitted["nonlinear_stiffness.stiffness"] == pytest.approx(cubic, rel=0.03)
 
 
+@pytest.mark.long
 def test_a_ripple_far_below_the_noise_is_named() -> None:
     ripple, period, noise = 0.5, 0.031, 1.5  # [N], [m], [N]
     found = _diagnosed(lambda q: ripple * float(np.sin(2.0 * np.pi * q / period)), 14.0, 0.1, noise)

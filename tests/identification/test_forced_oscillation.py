@@ -163,6 +163,14 @@ def test_a_body_that_rests_in_every_period_is_refused() -> None:
     assert "rests for" in str(caught.value)
 
 
+@pytest.mark.parametrize("position", [0.0, 0.3])
+def test_a_body_that_does_not_move_is_refused(position: float) -> None:
+    t = 1e-3 * np.arange(8000)
+    record = Record(t, np.full_like(t, position), np.sin(2.0 * np.pi * 2.0 * t))
+    with pytest.raises(IdentificationError, match="does not move"):
+        harmonics_of(record, 4.0 * np.pi)
+
+
 def test_runs_at_one_frequency_do_not_tell_mass_from_stiffness() -> None:
     with pytest.raises(IdentificationError) as caught:
         METHODS["forced-oscillation"].fit(_structure(), [_forced(3.0, 8.0, 1.0), _forced(3.0, 12.0, 1.0)], Options())

@@ -34,7 +34,7 @@ def wave(n: int, size: float, step: float, frequency: float = 1.3) -> Array:
 # --- rigidly coupled ---
 
 
-@pytest.mark.parametrize("terms", [DRY, LUGRE], ids=["dry", "lugre"])
+@pytest.mark.parametrize("terms", [DRY, pytest.param(LUGRE, marks=pytest.mark.long)], ids=["dry", "lugre"])
 def test_without_a_transmission_both_are_one_body(terms: tuple[Term, ...]) -> None:
     u = wave(3000, 5.0, 1e-3)
     pair, friction = Simulator(bed(*terms)).run(u, 1e-3, 4)

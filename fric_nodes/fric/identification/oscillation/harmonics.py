@@ -119,7 +119,7 @@ def harmonics_of(record: Record, frequency: float | None = None, held: Held | No
         held: tells the friction of the body where it rests; None: it isn't known, and counts as none.
 
     Raises:
-        IdentificationError: fewer than four steady periods, or the body rests in each of them.
+        IdentificationError: fewer than four steady periods, or the body does not move.
     """
     even = at_stamps(record.uniform())
     w = main_frequency(even) if frequency is None else frequency
@@ -136,6 +136,8 @@ def harmonics_of(record: Record, frequency: float | None = None, held: Held | No
             f"sampled too slowly: {period / step:.3g} samples in a period",
             f"record at {_PER_PERIOD / period:.3g} Hz",
         )
+    if float(np.ptp(even.position)) == 0.0:
+        raise IdentificationError(record.source, "the body does not move", "let a larger force act on it")
     velocity, slow, width = _velocity(even, w)
     smooth = np.clip(velocity / slow, -1.0, 1.0)
     if held is not None and held.coulomb > 0.0:
