@@ -136,8 +136,6 @@ def harmonics_of(record: Record, frequency: float | None = None, held: Held | No
             f"sampled too slowly: {period / step:.3g} samples in a period",
             f"record at {_PER_PERIOD / period:.3g} Hz",
         )
-    if float(np.ptp(even.position)) == 0.0:
-        raise IdentificationError(record.source, "the body does not move", "let a larger force act on it")
     velocity, slow, width = _velocity(even, w)
     smooth = np.clip(velocity / slow, -1.0, 1.0)
     if held is not None and held.coulomb > 0.0:
@@ -178,7 +176,12 @@ def _velocity(even: Record, w: float) -> tuple[Array, float, int]:
     """Velocity [x/s], shape ``(n,)``, the speed below which the body may rest [x/s], and the window of the velocity [samples].
 
     Over the shortest window in which noise stays below that speed, since a rest is no longer than a few hundredths of a period.
+
+    Raises:
+        IdentificationError: the body does not move.
     """
+    if float(np.ptp(even.position)) == 0.0:
+        raise IdentificationError(even.source, "the body does not move", "let a larger force act on it")
     step, n = even.sample_time, even.n_samples
     noise = level_of(even.position)
     peak = 0.5 * w * float(np.ptp(even.position[n // 2 :]))
