@@ -28,10 +28,17 @@ _NICE = 5  # numerical: the diagnosis itself comes first
 
 
 class Part(NamedTuple):
-    """Something to compile: its name for people, and what does it."""
+    """Something to compile.
+
+    Attributes:
+        name: for people.
+        compiled: compiles it, or finds it on disk.
+        at_once: every diagnosis asks for it as soon as the recordings are read.
+    """
 
     name: str
     compiled: Callable[[], None]
+    at_once: bool = False
 
 
 def parts() -> list[Part]:
@@ -45,7 +52,8 @@ def parts() -> list[Part]:
             if plant is not None:
                 behind = "" if plant is alone else f", {'elastic' if elastic else 'stiff'} transmission"
                 what = f"{alone.title}{behind}, {contact}"
-                found += [Part(f"{what}: {name}", partial(compile_loop, plant, rigid, elastic, name)) for name in names]
+                compiled = {name: partial(compile_loop, plant, rigid, elastic, name) for name in names}
+                found += [Part(f"{what}: {name}", compiled[name], rigid and plant is alone) for name in names]
     return found + [Part(effect.title, partial(compile_effect, effect)) for effect in EFFECTS.values()]
 
 
@@ -95,11 +103,10 @@ def _stamp() -> Path | None:
 def _beside() -> None:
     """Compile all parts while another process compiles them, too: those that it needs at once come last."""
     os.nice(_NICE)
-    todo = parts()
-    at_once = [part for part in todo if "transmission" not in part.name and "dry friction" in part.name]
-    for part in (*(part for part in todo if part not in at_once), *at_once):
-        part.compiled()
-    compile_all()
+    for part in parts():
+        if not part.at_once:
+            part.compiled()
+    compile_all()  # the others, and it says that all are there
 
 
 if __name__ == "__main__":

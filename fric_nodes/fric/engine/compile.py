@@ -56,7 +56,7 @@ IMPORTS = (
     "from typing import Any",
     "from fric.engine.assembled import Inner, Surroundings",
     "from fric.effect import Context",
-    "from fric.engine.kernel import hidden, kernel, local_array, loop",
+    "from fric.engine.kernel import kernel, local_array, loop",
 )
 
 

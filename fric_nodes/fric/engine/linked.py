@@ -4,8 +4,8 @@
 compiling. Where hundreds of structures are tried, as in a diagnosis, these seconds are minutes. Here the loops hold the plant
 alone. What a model's terms do they look up in a table, made when the model is: for each role (slip level, force, memory,
 command path, transmission) the addresses of the terms' functions with the places of their parameters and of their memory.
-Every effect is compiled once, by itself, and kept on disk as the loops are. A step with half a dozen terms takes up to twice as
-long as one that is compiled for them.
+Every effect is compiled once, by itself, and kept on disk as the loops are. A step takes longer than one that is compiled for
+its terms, the more so the fewer there are.
 
 Each function has the same form, so that the terms of a role are one chain: ``f(c, total, memory, p)`` takes what the terms
 before it have come to and gives what they come to with it; ``c`` is the :class:`fric.effect.Context` without the memory, or
