@@ -2,6 +2,9 @@
 
 Fixed step, exact sticking, and as many sub-steps as the fastest rate of the model asks for. Long runs are one call; a node
 that goes sample by sample keeps a :class:`Simulator` or a :class:`Predictor`, whose state lives from call to call.
+
+A structure of a model is compiled into loops of its own where it runs for long or again and again (``fused``); else it runs on
+loops that serve all structures (:mod:`fric.engine.linked`), whose steps take longer but need no seconds of compiling first.
 """
 
 from __future__ import annotations
@@ -11,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .engine.compile import Loops
+from .engine.linked import Linked
 from .model import Model
 from .record import Array
 
@@ -18,6 +23,7 @@ __all__ = ["Motion", "Predictor", "Simulator", "intervals", "predict_force", "re
 
 _STEP_OF_RATE = 0.04  # largest product of step and fastest rate; keeps forces to 1e-4 of their range
 _MAX_SUBSTEPS = 2000
+_WORTH_COMPILING = 50_000_000  # steps of one run: what they take longer on loops for all structures is what compiling takes
 _NOMINAL_LOAD = np.array([1.0])
 _NOMINAL_TEMPERATURE = np.array([0.0])
 
@@ -63,6 +69,11 @@ def substeps(model: Model, sample_time: float, step_of_rate: float = _STEP_OF_RA
     return min(max(wanted, 1), _MAX_SUBSTEPS)
 
 
+def _running(model: Model, fused: bool) -> tuple[Loops, Array | Linked]:
+    """The loops on which ``model`` runs, and its values as they take them."""
+    return (model.loops, model.values) if fused else (model.linked_loops, model.linked)
+
+
 class Simulator:
     """A model in motion, step by step.
 
@@ -70,6 +81,7 @@ class Simulator:
         model: what moves.
         position: start [x], as the sensor sees it.
         velocity: start [x/s].
+        fused: True to compile loops for this structure, where many models of it run; False leaves that to single long runs.
 
     Attributes:
         states: the plant's, shape ``(n_states,)``.
@@ -79,9 +91,9 @@ class Simulator:
         time: [s].
     """
 
-    def __init__(self, model: Model, position: float = 0.0, velocity: float = 0.0) -> None:
-        self._loops = model.loops
-        self._values = model.values
+    def __init__(self, model: Model, position: float = 0.0, velocity: float = 0.0, *, fused: bool = False) -> None:
+        self._fused = fused
+        self._running = _running(model, fused)
         self._model = model
         self._encoder = model.plant.encoder
         plant_values = np.array(model.plant_values)
@@ -134,8 +146,11 @@ class Simulator:
         states = np.empty((effort.shape[0], self.states.shape[0]))
         friction = np.empty(effort.shape[0])
         applied = np.empty(effort.shape[0])
-        self._loops.simulate(
-            self._values, np.ascontiguousarray(effort), sample_time, n_substeps, self.time, load, temperature,
+        if not self._fused and effort.shape[0] * n_substeps > _WORTH_COMPILING:
+            self._fused, self._running = True, _running(self._model, True)
+        loops, values = self._running
+        loops.simulate(
+            values, np.ascontiguousarray(effort), sample_time, n_substeps, self.time, load, temperature,
             self.states, self.friction_state, self.memory, states, friction, applied,
         )  # fmt: skip
         self.time += effort.shape[0] * sample_time
@@ -160,6 +175,7 @@ def simulate(
     n_substeps: int | None = None,
     load: Array = _NOMINAL_LOAD,
     temperature: Array = _NOMINAL_TEMPERATURE,
+    fused: bool = False,
 ) -> Motion:
     """Free run of ``model`` under the forces ``effort``.
 
@@ -173,8 +189,9 @@ def simulate(
         n_substeps: steps per sample; None takes what the model's fastest rate asks for.
         load: normal load relative to nominal, one value or one per interval.
         temperature: difference from the reference temperature [K], one value or one per interval.
+        fused: True to compile loops for this structure, see :class:`Simulator`.
     """
-    simulator = Simulator(model, position, velocity)
+    simulator = Simulator(model, position, velocity, fused=fused)
     start = simulator.states.copy()
     states, friction, applied = simulator.follow(intervals(effort, hold), sample_time, n_substeps, load, temperature)
     states = np.vstack([start, states])
@@ -198,11 +215,12 @@ def respond(model: Model, effort: Array, sample_time: float) -> Array:
     """
     if not model.has_command_path:
         return effort
-    # Friction needs neither its structure compiled nor its steps here: a contact may be a thousand times faster than a drive.
+    # Friction needs no steps here: a contact may be a thousand times faster than a drive.
     path = model.with_terms([held for held in model.terms if held.effect.command is not None])
     applied = np.empty(effort.shape[0])
     _, memory = path.inner_states()
-    path.loops.respond(path.values, np.ascontiguousarray(effort), sample_time, substeps(path, sample_time), memory, applied)
+    loops, values = _running(path, False)
+    loops.respond(values, np.ascontiguousarray(effort), sample_time, substeps(path, sample_time), memory, applied)
     return applied
 
 
@@ -213,11 +231,11 @@ class Predictor:
 
     Args:
         model: what is to be moved.
+        fused: True to compile loops for this structure, see :class:`Simulator`.
     """
 
-    def __init__(self, model: Model) -> None:
-        self._loops = model.loops
-        self._values = model.values
+    def __init__(self, model: Model, *, fused: bool = False) -> None:
+        self._running = _running(model, fused)
         self.friction_state, self.memory = model.inner_states()
 
     def run(
@@ -233,8 +251,9 @@ class Predictor:
         """Force needed at each sample and its friction part [F], each of shape ``(n_samples,)``."""
         effort = np.empty(position.shape[0])
         friction = np.empty(position.shape[0])
-        self._loops.predict(
-            self._values, time, position, velocity, acceleration, sample_time, load, temperature,
+        loops, values = self._running
+        loops.predict(
+            values, time, position, velocity, acceleration, sample_time, load, temperature,
             self.friction_state, self.memory, effort, friction,
         )  # fmt: skip
         return effort, friction

@@ -15,11 +15,11 @@ SCRIPT = """
 import sys, time
 import numpy as np
 from fric.model import build_model, term
-from fric.simulation import predict_force, simulate
+from fric.simulation import Predictor, simulate
 model = build_model("rigid", {"mass": 1.2}, [term("coulomb", force=4.0)])
 start = time.perf_counter()
-motion = simulate(model, np.full(100, 9.0), 1e-3)
-predict_force(model, np.zeros(2), np.zeros(2), np.ones(2), np.zeros(2), 1e-3)
+motion = simulate(model, np.full(100, 9.0), 1e-3, fused=True)
+Predictor(model, fused=True).run(np.zeros(2), np.zeros(2), np.ones(2), np.zeros(2), 1e-3)
 took = time.perf_counter() - start
 (module,) = [module for name, module in sys.modules.items() if name.startswith("fric_assembled")]
 stats = [module.simulate.stats, module.predict.stats]

@@ -40,7 +40,7 @@ from fric.simulation import simulate
 h = 1e-3
 model = build_model("rigid", {"mass": 2.0}, [term("coulomb", force=5.0), term("viscous", coefficient=20.0)])
 effort = 18.0 * np.sin(8.0 * h * np.arange(3000))
-made = simulate(model, effort, h)
+made = simulate(model, effort, h, fused=True)  # not what is asked for here
 track = Track.of([Record(h * np.arange(3000), made.position[:3000], effort)], 100.0, model)
 track.residual(model), track.needed(model), twins(track, model, 1), track._followed(model, None)
 """

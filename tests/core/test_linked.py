@@ -10,7 +10,7 @@ import pytest
 from fric.engine.linked import linked
 from fric.model import Model, Term, build_model, term
 from fric.record import Array
-from fric.simulation import predict_force
+from fric.simulation import Simulator, predict_force
 
 H, N = 1e-3, 1500
 PLAIN = (term("coulomb", force=5.0), term("viscous", coefficient=3.0))
@@ -105,3 +105,12 @@ def test_the_addresses_of_another_process_are_its_own() -> None:
     }
     assert len(answers) == 1
     assert "nan" not in answers.pop()
+
+
+def test_a_run_that_takes_longer_than_compiling_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, effort = MODELS["plain"], 20.0 * np.sin(0.009 * np.arange(N))
+    expected = Simulator(model, fused=True).run(effort, H)[0]
+    monkeypatch.setattr("fric.simulation._WORTH_COMPILING", N)
+    short, long = Simulator(model).run(effort, H, 1)[0], Simulator(model).run(np.append(effort, 0.0), H, 1)[0]
+    np.testing.assert_array_equal(long[:-1], expected)
+    np.testing.assert_allclose(short, expected, rtol=1e-9, atol=1e-12)

@@ -106,18 +106,22 @@ entry = cast(Callable[[int, int], int], intrinsic(_entry))
 
 
 class Instant(NamedTuple):
-    """A context in a linked loop: what plants look at by name, and all of it in the order in which terms take it.
+    """A context in a linked loop: as plants look at it, by name, and all of it in the order in which terms take it.
 
     Attributes:
-        position: [x].
-        velocity: [x/s].
-        memory: as in :class:`fric.effect.Context`.
-        numbers: the fields of a context but the memory, shape ``(9,)``.
+        numbers: the fields of a :class:`fric.effect.Context` but the memory, shape ``(9,)``; the other attributes are these.
     """
 
     position: float
     velocity: float
+    direction: float
+    time: float
+    load: float
+    temperature: float
+    acceleration: float
+    step: float
     memory: Any
+    push: float
     numbers: Any
 
 
@@ -125,7 +129,8 @@ def _instant(
     typing_context: Any, position: Any, velocity: Any, direction: Any, time: Any, load: Any, temperature: Any,
     acceleration: Any, step: Any, memory: Any, push: Any,
 ) -> Any:  # fmt: skip
-    kind = cast(Any, types).NamedTuple((_NUMBER, _NUMBER, memory, types.Array(_NUMBER, 1, "C")), Instant)
+    given = (*[_NUMBER] * 8, memory, _NUMBER)
+    kind = cast(Any, types).NamedTuple((*given, types.Array(_NUMBER, 1, "C")), Instant)
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         number = context.get_value_type(_NUMBER)
@@ -135,10 +140,9 @@ def _instant(
         for k, field in enumerate(fields):
             builder.store(field, builder.gep(first, [ir.Constant(context.get_value_type(types.intp), k)]))
         numbers = array_over(context, builder, first, len(fields))
-        return context.make_tuple(builder, kind, (arguments[0], arguments[1], arguments[8], numbers))
+        return context.make_tuple(builder, kind, (*arguments, numbers))
 
-    numbers = [_NUMBER] * 8
-    return kind(*numbers, memory, _NUMBER), code
+    return kind(*given), code
 
 
 instant = cast(Callable[..., Instant], intrinsic(_instant))

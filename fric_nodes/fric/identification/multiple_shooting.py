@@ -142,7 +142,7 @@ class Shooting:
         first = self.first_errors
         errors, ends = np.empty(int(first[-1])), np.empty((len(self.runs), 2))
         leaders = _leaders(model, self.runs) if model.has_slip_dynamics else None
-        simulator = Simulator(model)
+        simulator = Simulator(model, fused=True)
         encoder = list(model.plant.encoder)
         values = np.array(model.plant_values)
         friction, memory = (part.copy() for part in (simulator.friction_state, simulator.memory))
@@ -345,7 +345,7 @@ def _leaders(model: Model, runs: Sequence[Run]) -> list[Array]:
     led: Predictor | None = None
     for run in runs:
         if not run.follows or led is None:
-            led = Predictor(model)
+            led = Predictor(model, fused=True)
         found.append(led.friction_state.copy())
         s, inner = run.stretch, slice(run.first, run.last - 1)
         led.run(

@@ -44,7 +44,7 @@ def _spent(run: Callable[[], object], repeats: int = _REPEATS) -> float:
 
 def _in_plant(n: int, force: float, n_steps: int) -> tuple[float, float]:
     """Time per step [s] and way per step [mean waves] under a force around ``force`` [N]."""
-    simulator = Simulator(_model(n))
+    simulator = Simulator(_model(n), fused=True)
     effort = force + 20.0 * np.sin(0.3 * np.arange(n_steps))
     states, _ = simulator.run(np.full(max(n_steps, 600) if n <= _N else n_steps, force), _H)
     spent = _spent(lambda: simulator.run(effort, _H)) / n_steps
@@ -76,7 +76,7 @@ def run() -> list[Figure]:
         figures.append(
             Figure(f"{_N} asperities in the plant, {name}, {way:.2g} mean waves per step", _H / spent, "x real time", goal)
         )
-    simulator = Simulator(_model(_N))
+    simulator = Simulator(_model(_N), fused=True)
     spent = _spent(lambda: [simulator.step(50.0, _H) for _ in range(100)]) / 100
     figures.append(Figure(f"{_N} asperities in the plant, pre-sliding, one call per sample", _H / spent, "x real time", ">= 1"))
     few, many = _driven(1000), _driven(1_000_000)

@@ -123,7 +123,7 @@ def _pair(name: str, model: Model, other: _Run, methods: Sequence[str], fine: st
     def error(position: Array) -> float:
         return float(np.sqrt(np.mean((position - truth) ** 2)) / np.ptp(truth))
 
-    mine = error(simulate(model, effort, _STEP).position)
+    mine = error(simulate(model, effort, _STEP, fused=True).position)
     tried = []
     for method in methods:
         for tolerance in _LADDER:
@@ -143,7 +143,7 @@ def _pair(name: str, model: Model, other: _Run, methods: Sequence[str], fine: st
 
     return Pair(
         f"simulation of {_STEP * (_N - 1):g} s against solve_ivp, {name}",
-        lambda: _timed(lambda: simulate(model, effort, _STEP)),
+        lambda: _timed(lambda: simulate(model, effort, _STEP, fused=True)),
         functools.partial(_timed, functools.partial(other, method, tolerance)),
         turns=_TURNS,
         even=True,
