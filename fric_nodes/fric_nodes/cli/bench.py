@@ -35,6 +35,7 @@ def bench(
     hours: Annotated[
         int | None, typer.Option("--hours", help="With 'long-recordings': the length of the only recording, in h.")
     ] = None,
+    cases: Annotated[int | None, typer.Option("--cases", help="With 'sparse-regression': how many simulated axes.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed and accuracy on this machine; exit status 1 when a goal is missed."""
@@ -51,7 +52,7 @@ def bench(
     for name in chosen:
         if name not in BENCHMARKS:
             raise InputError("fric bench", f"no benchmark '{name}'", f"choose from {', '.join(BENCHMARKS)}")
-    sizes = {"recordings": recordings, "hours": hours}
+    sizes = {"recordings": recordings, "hours": hours, "cases": cases}
     for what, size in sizes.items():
         takers = [name for name, benchmark in BENCHMARKS.items() if benchmark.sized and benchmark.size == what]
         if size is not None and (size < 1 or not set(takers) & set(chosen)):
