@@ -6,7 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
-from fric.diagnosis.prove.examination import hold
+from fric.diagnosis.prove.cases import VARIANTS, plan
+from fric.diagnosis.prove.examination import Examination, hold
+from fric.diagnosis.prove.scoring import Found, Outcome, scored
 from fric.diagnosis.prove.sealing import open_key
 from fric.errors import InputError
 from fric.report.prove import prove_page
@@ -86,6 +88,21 @@ def test_an_examination_from_seed_to_page(tmp_path: Path, entry: str) -> None:
     key_file.write_text(key_file.read_text().replace("fric-prove-keys", "fric-proved-keys"))
     with pytest.raises(InputError, match="hash"):
         hold(3, 2, out, entry=entry)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_page_shows_a_miss_of_every_kind_of_case(variant: str) -> None:
+    kinds = sorted({order.kind for order in plan(40, 1, variant)})
+    missed = [
+        Outcome(
+            number=k, kind=kind, effects=("ripple",), outside="", components=frozenset({"load"}), mismatch=True,
+            findings=(Found("bias", 0.4, "", "load"),), held=0.5, ratio=1.5, noe_nominal=3.0, noe_refit=2.0, noe_augmented=1.0,
+            noe_own=0.9, strength=2.0, floor=0.1, seconds=5.0,
+        )
+        for k, kind in enumerate(kinds)
+    ]  # fmt: skip
+    page = prove_page(Examination(missed, scored(missed, variant), "0" * 64, 9.0), "fric prove")
+    assert all(f"cases/{each.number:04d}/report.json" in page for each in missed)
 
 
 def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:

@@ -275,7 +275,7 @@ KNOWN: dict[str, Case] = {
     },
     **{f"fric verify {it}": _LONGEST for it in ("--out verification.html", "compensation-guideway", "compensation-robust")},
     **{f"fric compete{how}": _LONGEST for how in ("", " --out competition.html", " --quick --out competition.html")},
-    **dict.fromkeys(("fric demo", "fric demo --clock wall"), _LONGEST),
+    **dict.fromkeys(("fric demo", "fric demo --clock wall", "fric bench sparse-regression"), _LONGEST),
     "fric batch identify bags --terms coulomb,viscous,bias --out fleet": Case(),
     **{
         f"fric {name}": _JUDGED

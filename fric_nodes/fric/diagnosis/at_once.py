@@ -127,7 +127,7 @@ def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None])
     if growth.together is growth.end and not faster:
         return growth  # it is what growing together came to: once more it would come to the same
     tell("looking for what helps beside it")
-    start = replace(growth, beyond=0.0)
+    start = replace(growth, slower=False, beyond=0.0)
     if found is not None and faster:
         track, begin = found
         end = refit(track, growth.end.fit.model)

@@ -1,4 +1,4 @@
-"""From what speaks for an effect beside something unknown to the probability that it is there: a map learnt from examinations.
+"""From what speaks for an effect to the probability that it is there: a map learnt from examinations.
 
 The logarithm of the odds is a weighted sum of a few measures of evidence (:class:`Evidence`) and of one number per effect:
 unknown physics looks like some effects more often than like others. No weight is negative, so that more evidence never counts
@@ -19,6 +19,7 @@ __all__ = ["FORMAT", "Calibration", "Evidence", "calibration", "measures_of"]
 
 FORMAT = "fric-calibration/1"
 _LEAST = 1e-3  # numerical: of a share, whose logarithm is taken
+_MARGIN = 7.0  # numerical: a rival that leaves a thousand times more is out
 _SURE = 12.0  # numerical: logarithm of odds, beyond which nothing is surer
 
 
@@ -33,6 +34,8 @@ class Evidence:
         functions: evidence for it where flexible functions of all other components are there [nats]; infinite where
             that was not asked.
         rivals: probability of the effect among itself and what was fitted in its place.
+        margin: logarithm of what the best of these leaves over what the effect leaves.
+        complete: True where the effects named are a full explanation, so that nothing unknown is said beside them.
     """
 
     share: float
@@ -40,6 +43,8 @@ class Evidence:
     halves: float
     functions: float = math.inf
     rivals: float = 1.0
+    margin: float = 0.0
+    complete: bool = False
 
 
 def measures_of(evidence: Evidence) -> dict[str, float]:
@@ -54,6 +59,9 @@ def measures_of(evidence: Evidence) -> dict[str, float]:
         "explained": math.log(max(1.0 - rest, _LEAST)),
         "share over rest": share - math.log(rest),
         "weakest": math.log1p(max(min(evidence.halves, evidence.functions), 0.0)),
+        "rivals": math.log(min(max(evidence.rivals, _LEAST), 1.0)),
+        "margin": min(max(evidence.margin, 0.0), _MARGIN),
+        "complete": float(evidence.complete),
     }
 
 
@@ -74,8 +82,8 @@ class Calibration:
     def probability(self, effect: str, evidence: Evidence) -> float:
         """That the effect with the id ``effect`` is there and none of its rivals, 0 to 1."""
         odds = self.offset + self.effects.get(effect, 0.0)
-        odds += sum(self.weights[name] * value for name, value in measures_of(evidence).items())
-        return evidence.rivals / (1.0 + math.exp(-min(max(odds, -_SURE), _SURE)))
+        odds += sum(self.weights.get(name, 0.0) * value for name, value in measures_of(evidence).items())
+        return 1.0 / (1.0 + math.exp(-min(max(odds, -_SURE), _SURE)))
 
 
 @lru_cache(maxsize=1)

@@ -14,7 +14,6 @@ from .candidates import Scales, scales_of
 from .component import Signature
 from .confidence import LITTLE_LEFT, MANY, is_doubtful
 from .findings import (
-    beside_unknown,
     finding_of,
     next_experiment,
     rejected_effects,
@@ -22,6 +21,7 @@ from .findings import (
     signature_of,
     unknown_finding,
     unlearnt_finding,
+    with_presences,
 )
 from .growth import Growth, without_nothings
 from .held_back import OnlyThere, only_there
@@ -159,10 +159,10 @@ def concluded(
     findings.sort(key=lambda each: -each.confidence * each.share)
     doubts = _doubts(seen, searched, findings)
     alone = None if seen.learnt or not seen.told else only_there(train, validation, held, seen.begin.model)
-    findings, unexplained, remains = _with_rest(seen, doubts, alone, findings, scales)
+    unknown, unexplained, remains = _rest(seen, doubts, alone, findings, scales)
+    findings = _surely(seen, unexplained, unknown, findings)
     everything = None if alone is None else unexplained.where
     if seen.missing:
-        unexplained = replace(unexplained, interval=interval_of(unexplained.share, seen.left, seen.floor))
         energy = difference_of(fast, seen.begin.model, seen.end)
         if remains is not None:
             energy = [explained + left_over for explained, left_over in zip(energy, remains, strict=True)]
@@ -192,26 +192,45 @@ def concluded(
     )
 
 
-def _with_rest(
-    seen: _Judged, doubts: _Doubts, alone: OnlyThere | None, findings: list[Finding], scales: Scales
-) -> tuple[list[Finding], Unexplained, list[Array] | None]:
-    """The findings with what stays unexplained, and the energy of that over time where there is any [F^2]."""
-    unexplained = Unexplained(max(seen.rest, seen.growth.beyond), None)
+def _rest(
+    seen: _Judged, doubts: _Doubts, alone: OnlyThere | None, findings: Sequence[Finding], scales: Scales
+) -> tuple[Finding | None, Unexplained, list[Array] | None]:
+    """The finding of something unknown, if there is any, what stays unexplained, and the energy of that over time [F^2]."""
+    share = max(seen.rest, seen.growth.beyond)
+    unexplained = Unexplained(share, None, interval_of(share, seen.left, seen.floor) if seen.missing else None)
     if alone is not None:
         remains = energy_left(seen.held, seen.left["refit"], seen.floor)
         where = locate(seen.held, remains, scales, seen.begin.model)
-        return [unlearnt_finding(where, alone, seen.scored)], Unexplained(1.0, where), remains
+        return unlearnt_finding(where, alone, seen.scored), Unexplained(1.0, where), remains
     if not seen.missing or not (doubts.unknown or seen.growth.end.excess > _MISMATCH * seen.growth.end.floor):
-        return findings, unexplained, None
+        return None, unexplained, None
     remains = energy_left(seen.held, seen.left["augmented"], seen.floor)
-    unexplained = replace(unexplained, where=locate(seen.held, remains, scales, seen.end))
-    return _beside_unknown(seen, doubts, unexplained, findings), unexplained, remains
+    where = locate(seen.held, remains, scales, seen.end)
+    unexplained = replace(unexplained, where=where)
+    if doubts.likely is None or not doubts.unknown or where is None:
+        return None, unexplained, remains
+    return (
+        unknown_finding(where, doubts.likely, seen.growth, seen.scored, unexplained.share, doubts.stand_in),
+        unexplained,
+        remains,
+    )
+
+
+def _surely(seen: _Judged, unexplained: Unexplained, unknown: Finding | None, findings: list[Finding]) -> list[Finding]:
+    """``findings`` with how sure each is there, whatever stays unexplained; behind what is ``unknown``, if anything is."""
+    shares = {each.effect: each.share for each in findings}
+    steps = seen.growth.steps
+    of_steps = {step.term: shares[step.term.split("#")[0]] for step in steps}
+    present = presences(seen.track, seen.end, steps, of_steps, min(unexplained.share, 1.0), unknown is None)
+    told = with_presences(present, findings, steps)
+    # Beside something unknown, what takes most off comes first.
+    return told if unknown is None else [unknown, *sorted(told, key=lambda each: -each.share)]
 
 
 def _judged(validation: Sequence[Record], whole: Sequence[Track], nominal: Model, growth: Growth) -> _Judged:
     """``growth`` held against the recordings ``validation``."""
     growth = unless_worse(validation, whole, growth)
-    held = shown(validation, growth.track, growth.begin.fit.model, growth.beyond > 0.0)
+    held = shown(validation, growth.track, growth.begin.fit.model, growth.slower)
     track, begin, end_fit = as_fast(whole, held, growth)
     growth, end = without_nothings(growth, with_errors(track, end_fit))
     left = {"nominal": held.residual(nominal), "refit": held.residual(begin.model), "augmented": held.residual(end)}
@@ -263,14 +282,3 @@ def _doubts(seen: _Judged, searched: Sequence[Track], findings: Sequence[Finding
     much = rest > most_left(growth) or seen.seen_rest > there
     unknown = seen.missing and (much or doubtful or stand_in or far_off or beside or bool(bent))
     return _Doubts(unknown, far_off, bent, likely, stand_in)
-
-
-def _beside_unknown(seen: _Judged, doubts: _Doubts, unexplained: Unexplained, findings: list[Finding]) -> list[Finding]:
-    """The findings with something unknown at their head, where they are no full explanation; else as they are."""
-    if doubts.likely is None or not doubts.unknown or unexplained.where is None:
-        return findings
-    nobody = unknown_finding(unexplained.where, doubts.likely, seen.growth, seen.scored, unexplained.share, doubts.stand_in)
-    shares = {each.effect: each.share for each in findings}
-    of_steps = {step.term: shares[step.term.split("#")[0]] for step in seen.growth.steps}
-    present = presences(seen.track, seen.end, seen.growth.steps, of_steps, min(unexplained.share, 1.0))
-    return [nobody, *beside_unknown(present, findings, seen.growth.steps)]

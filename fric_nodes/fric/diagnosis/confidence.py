@@ -1,4 +1,7 @@
-"""How sure a finding is: the share of cases in which findings of this kind were right.
+"""Whether effects are an explanation: how often findings of their kind were right, by what they leave.
+
+This decides whether something unknown is said and in which order effects stand. How sure each of them is told to be is in
+:mod:`.presence`.
 
 Three things tell: how much better the effect explains what is missing than its best rival does, how much of that is left, and
 how much of it the effect is: what is a small part may only mend the form of another's law. They enter a logistic function. The
@@ -42,7 +45,7 @@ _OFFSET, _BY_RIVAL, _BY_REST = 1.2, 1.58, -14.1
 _BY_SHARE, _WHOLE = 0.7, 0.2  # of what is missing: what takes more of it doesn't mend another's law
 _LEAST = 0.01  # of what is missing: what takes less has come since it takes nearly all that the others leave
 _MOST = 0.995
-_FAINTLY_UNKNOWN = 0.35
+_FAINTLY_UNKNOWN = 0.35  # statistical: where hardly more than noise is missing, as unknown_confidence says
 
 FAINT = 1.0
 """Noise floors: with less missing than that, what it is can hardly be told."""

@@ -32,7 +32,6 @@ from .start import FIRST_FIT
 from .track import Track
 
 __all__ = [
-    "beside_unknown",
     "finding_of",
     "next_experiment",
     "rejected_effects",
@@ -40,6 +39,7 @@ __all__ = [
     "signature_of",
     "unknown_finding",
     "unlearnt_finding",
+    "with_presences",
 ]
 
 _SHARED = 1.0 / 3.0  # of what is missing: where effects are missed by less altogether, each can stand in for the others
@@ -51,8 +51,8 @@ _STANDS_OUT = 3.0  # times the floor: with less, noise is more than a quarter of
 _UNDECIDED = 0.45  # confidence at most, where no parameter of an effect is as large as its own standard error
 
 
-def beside_unknown(sure: Mapping[str, Presence], findings: Sequence[Finding], steps: Sequence[Step]) -> list[Finding]:
-    """What helps beside something unknown, as sure as it is there whatever that is; what takes most off first."""
+def with_presences(sure: Mapping[str, Presence], findings: Sequence[Finding], steps: Sequence[Step]) -> list[Finding]:
+    """``findings``, each as sure as what speaks for it makes it (:mod:`.presence`)."""
     by_effect = {step.term.split("#")[0]: sure[step.term] for step in steps}
     held = []
     for each in findings:
@@ -63,7 +63,7 @@ def beside_unknown(sure: Mapping[str, Presence], findings: Sequence[Finding], st
         held.append(
             replace(each, confidence=found.probability, runner_up=runner, reproduced=found.halves, weighed=found.evidence)
         )
-    return sorted(held, key=lambda each: -each.share)
+    return held
 
 
 def reservations(growth: Growth, nominal: Model, far_off: bool, bent: Sequence[Term]) -> list[str]:

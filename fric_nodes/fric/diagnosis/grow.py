@@ -21,7 +21,7 @@ from .price import implausible
 from .settle import CLEARLY, HOPELESS, Step, audit
 from .track import Track
 
-__all__ = ["first_terms", "grow", "grown_faster", "leaves_much", "with_moves"]
+__all__ = ["first_terms", "grow", "grown_faster", "leaves_much", "left_beyond", "with_moves"]
 
 _TO_COMPARE = 2  # terms, after which another beginning is tried
 _OTHER_BEGINNINGS = 2
@@ -68,8 +68,15 @@ def grow(
         tell(f"much of it stays unexplained to an observer of {best.track.bandwidth:.3g} rad/s; looking with a slower one")
         other = _best_growth(slower, nominal, tell)
         if other.steps and other.rest < min(best.rest, _HARDLY):
-            return replace(other, beyond=best.rest)
+            return replace(other, slower=True, beyond=left_beyond(best, other))
     return grown_faster(tracks, best, tell)
+
+
+def left_beyond(fast: Growth, slow: Growth) -> float:
+    """Share that neither growth explains to the faster observer of ``fast``; 0 where ``slow`` explains it to that one, too."""
+    begin, end = (refit(fast.track, state.fit.model) for state in (fast.begin, slow.end))
+    left = audit(fast.track, begin.fit.model, end.fit.model)
+    return min(left, fast.rest) if left > AGAIN else 0.0
 
 
 def grown_faster(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None]) -> Growth:

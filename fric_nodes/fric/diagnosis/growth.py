@@ -51,7 +51,8 @@ class Growth:
         rejected: terms that came and went, with the reason.
         beginnings: what the first term was chosen from, the best first.
         ended: False where more terms may help.
-        beyond: share that nothing explains to a faster observer, where a slower one was taken instead; else 0.
+        slower: True where what is missing is told by a slower observer than the fastest to which it stands out.
+        beyond: share that nothing explains to that one then; else 0.
         unhelped: the same before terms came that only help beside something unknown; None where none did.
         together: what growing by several terms at once ended with; None where that wasn't done.
     """
@@ -65,6 +66,7 @@ class Growth:
     rejected: tuple[tuple[str, str], ...] = field(default=())
     beginnings: tuple[Rival, ...] = field(default=())
     ended: bool = False
+    slower: bool = False
     beyond: float = 0.0
     unhelped: Growth | None = None
     together: State | None = None

@@ -73,7 +73,7 @@ def unless_worse(validation: Sequence[Record], whole: Sequence[Track], growth: G
     plain = growth.unhelped
     if plain is None:
         return growth
-    held = shown(validation, growth.track, growth.begin.fit.model, growth.beyond > 0.0)
+    held = shown(validation, growth.track, growth.begin.fit.model, growth.slower)
     left = [held.residual(as_fast(whole, held, each)[2].model) for each in (growth, plain)]
     return growth if float(left[0] @ left[0]) < float(left[1] @ left[1]) else plain
 

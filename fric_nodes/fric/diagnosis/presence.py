@@ -4,12 +4,13 @@ The grown model is fitted with a term and without it, everything else fitted ane
 recordings, at first order, and judged on the other half; and the other way round. What is there takes its part off either half.
 So the smaller of the two differences counts, as the logarithm of a likelihood ratio. What stays unexplained wanders: both
 residuals pass the filter that makes white what the model with the term leaves, so that a wander counts as one value and not as
-many. A rival fitted in full shares the probability by Bayes' rule.
+many. How probable the effect is beside the rivals that were fitted in full is reckoned by
+Bayes' rule.
 
 What belongs to no law may be mended by the same wrong law in either half. So a law has to be asked for, too, where flexible
 functions of all other components of the machine are there (:mod:`.additive.asked`): what these explain as well is no evidence
-for it. How sure all this makes an effect was learnt from examinations (:mod:`.calibration`): physics outside the vocabulary
-imitates some laws with much evidence, and likelihoods alone would be too sure.
+for it. How sure all this makes an effect, and what else speaks for it, was learnt from examinations (:mod:`.calibration`):
+physics outside the vocabulary imitates some laws with much evidence, and likelihoods alone would be too sure.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from ..record import Array
 from .additive.asked import Asked
 from .additive.residual import independent_values
 from .calibration import Evidence, calibration
+from .confidence import margin_of
 from .fitting import refit
 from .least_squares import Fit
 from .screen import restraint
@@ -72,7 +74,7 @@ class Presence:
 
 
 def presences(
-    track: Track, end: Model, steps: Sequence[Step], shares: Mapping[str, float], unexplained: float
+    track: Track, end: Model, steps: Sequence[Step], shares: Mapping[str, float], unexplained: float, complete: bool = False
 ) -> dict[str, Presence]:
     """How sure each term of the grown model ``end`` is there, by the name of the term.
 
@@ -82,6 +84,7 @@ def presences(
         steps: by which its terms came.
         shares: of what is missing that each of them explains, by the name of the term.
         unexplained: share of what is missing that it leaves, 0 to 1.
+        complete: True where that is no more than an explanation leaves.
     """
     if not steps:
         return {}
@@ -104,7 +107,8 @@ def presences(
             halves.append(Half(nats, {name: value for name, value in values.items() if name.startswith(f"{step.term}.")}))
         least = min(each.nats for each in halves)
         functions = asked.nats(place)
-        evidence = Evidence(shares[step.term], unexplained, least, functions, _among_rivals(step, independent))
+        rivals = _among_rivals(step, independent)
+        evidence = Evidence(shares[step.term], unexplained, least, functions, rivals, margin_of(step), complete)
         sure = calibration().probability(step.term.split("#")[0], evidence)
         found[step.term] = Presence(round(sure, 4), (halves[0], halves[1]), evidence)
     return found

@@ -26,6 +26,7 @@ _KINDS = {
     "unknown": "outside the vocabulary",
     "nothing": "nothing missing",
     "mixed": "one effect, one outside the vocabulary",
+    "compound": "three to five effects",
 }
 
 

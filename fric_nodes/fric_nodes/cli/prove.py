@@ -121,7 +121,8 @@ def _calibrate(examinations: list[Path], out: Path) -> None:
     content = learnt(examinations)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "calibration.json", json.dumps(content, indent=1) + "\n")
-    typer.echo(f"{content['findings']} findings beside something unknown, {content['right']} of them right")
+    typer.echo(f"{content['findings']} findings, {content['right']} of them right")
+    typer.echo(f"calibration error on cases that the map was not learnt from: {content['off on other cases']}")
     typer.echo(f"written: {out / 'calibration.json'}")
 
 

@@ -1,6 +1,6 @@
 """Learning the map from evidence to probability (:mod:`..calibration`) from examinations that are over.
 
-Every finding beside something unknown is one trial: the effect was concealed in that case or not. The weights maximise the
+Every finding is one trial: the effect was concealed in that case or not. The weights maximise the
 penalised likelihood of all trials (logistic regression; a normal prior on the weights and a narrower one on what is added per
 effect, so that an effect that was seldom seen is taken for an ordinary one). Each weight is kept from falling below zero.
 """
@@ -19,10 +19,11 @@ from scipy.optimize import minimize
 
 from ...errors import InputError
 from ...record import Array
-from ..calibration import FORMAT, Evidence, measures_of
+from ..calibration import FORMAT, Calibration, Evidence, measures_of
+from .scoring import calibration_bins
 from .sealing import case_folder, open_key, published
 
-__all__ = ["Trial", "fitted", "learnt", "trials_of"]
+__all__ = ["Trial", "fitted", "learnt", "off_on_others", "trials_of"]
 
 _WEIGHT = 2.0  # statistical: standard deviation of a weight before anything is known
 _EFFECT = 1.0  # statistical: of what is added for an effect: odds of three to one are nothing special
@@ -31,15 +32,16 @@ _FEWEST = 30  # statistical: trials from which weights can be learnt
 
 @dataclass(frozen=True)
 class Trial:
-    """One finding: of which effect, what spoke for it, and whether it was right."""
+    """One finding: of which effect, what spoke for it, whether it was right, and in which case of which examination."""
 
     effect: str
     evidence: Evidence
     right: bool
+    case: str = ""
 
 
 def trials_of(out: Path) -> Iterator[Trial]:
-    """The findings beside something unknown of the examination in the folder ``out``.
+    """The findings of the examination in the folder ``out``, but those of something unknown.
 
     Raises:
         InputError: it holds none.
@@ -49,12 +51,13 @@ def trials_of(out: Path) -> Iterator[Trial]:
     for key in open_key(out):
         at = case_folder(out, key["number"]) / "report.json"
         findings = json.loads(at.read_text(encoding="utf-8"))["findings"] if at.exists() else []
-        if not any(each["effect"] == "unknown" for each in findings):
-            continue
         for each in findings:
             if each.get("weighed"):
-                evidence = Evidence(**{name: math.inf if value is None else value for name, value in each["weighed"].items()})
-                yield Trial(each["effect"], evidence, each["effect"] in key["effects"])
+                weighed: dict[str, Any] = {
+                    name: math.inf if value is None else value for name, value in each["weighed"].items()
+                }
+                evidence = Evidence(**weighed)
+                yield Trial(each["effect"], evidence, each["effect"] in key["effects"], str(case_folder(out, key["number"])))
 
 
 def learnt(outs: Sequence[Path]) -> dict[str, Any]:
@@ -65,15 +68,27 @@ def learnt(outs: Sequence[Path]) -> dict[str, Any]:
     """
     trials = [trial for out in outs for trial in trials_of(out)]
     if len(trials) < _FEWEST:
-        problem = f"hold {len(trials)} findings beside something unknown, at least {_FEWEST} are needed"
+        problem = f"hold {len(trials)} findings, at least {_FEWEST} are needed"
         raise InputError(", ".join(str(out) for out in outs), problem, "give more examinations")
-    return {"format": FORMAT, "examinations": [_provenance(out) for out in outs], **fitted(trials)}
+    known = {"format": FORMAT, "examinations": [_provenance(out) for out in outs], **fitted(trials)}
+    return {**known, "off on other cases": round(off_on_others(trials), 3)}
+
+
+def off_on_others(trials: Sequence[Trial]) -> float:
+    """Calibration error where the findings of each case are as sure as a map makes them that the other cases taught."""
+    pairs = []
+    for case in sorted({trial.case for trial in trials}):
+        content = fitted([trial for trial in trials if trial.case != case])
+        found = Calibration(content["offset"], content["weights"], content["effects"])
+        pairs += [(found.probability(t.effect, t.evidence), t.right) for t in trials if t.case == case]
+    return sum(n * abs(said - right) for said, right, n in calibration_bins(pairs)) / len(pairs)
 
 
 def _provenance(out: Path) -> dict[str, Any]:
     """Where the trials of a folder come from."""
     orders = json.loads((out / "plan.json").read_text(encoding="utf-8"))
-    return {"cases": len(orders), "variant": orders[0]["variant"], "sha256": published(out)}
+    diagnosed = sum((case_folder(out, order["number"]) / "report.json").exists() for order in orders)
+    return {"cases": diagnosed, "variant": orders[0]["variant"], "sha256": published(out)}
 
 
 def fitted(trials: Sequence[Trial]) -> dict[str, Any]:

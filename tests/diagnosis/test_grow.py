@@ -1,0 +1,46 @@
+"""A model grown with a slow observer is judged by the faster one that was given up for it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fric.diagnosis.fitting import State, refit
+from fric.diagnosis.grow import left_beyond
+from fric.diagnosis.growth import Growth
+from fric.diagnosis.track import Track
+from fric.model import Model, build_model, term
+from fric.record import Record
+from fric.simulation import simulate
+
+H = 1e-3
+PLAIN = (term("coulomb", force=5.0), term("viscous", coefficient=20.0))
+NOMINAL = build_model("rigid", {"mass": 2.0}, PLAIN)
+RIPPLE = term("ripple", cosine=2.0, sine=0.0, period=0.05)
+
+
+def growth(track: Track, begin: State, end: Model) -> Growth:
+    return Growth(track, begin, refit(track, end), (), (), 1.0)
+
+
+@pytest.fixture(scope="module")
+def tracks() -> list[Track]:
+    t = H * np.arange(8000)
+    effort = 18.0 * np.sin(5.0 * t) + 9.0 * np.sin(17.0 * t)
+    axis = build_model("rigid", {"mass": 2.0}, [*PLAIN, RIPPLE])
+    position = simulate(axis, effort, H, n_substeps=4).position[: t.size]
+    position += 1e-7 * np.random.default_rng(3).standard_normal(t.size)
+    return [Track.of([Record(t, position, effort)], bandwidth, NOMINAL) for bandwidth in (45.0, 140.0)]
+
+
+def test_what_it_explains_to_the_faster_one_too_is_not_left(tracks: list[Track]) -> None:
+    slow, fast = tracks
+    given_up = growth(fast, refit(fast, NOMINAL), NOMINAL)
+    whole = growth(slow, refit(slow, NOMINAL), NOMINAL.with_terms((*NOMINAL.terms, RIPPLE)))
+    assert left_beyond(given_up, whole) == 0.0
+
+
+def test_what_neither_explains_is_left(tracks: list[Track]) -> None:
+    slow, fast = tracks
+    given_up = growth(fast, refit(fast, NOMINAL), NOMINAL)
+    wrong = growth(slow, refit(slow, NOMINAL), NOMINAL.with_terms((*NOMINAL.terms, term("quadratic_drag", coefficient=1.0))))
+    assert left_beyond(given_up, wrong) > 0.5
