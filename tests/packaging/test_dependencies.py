@@ -24,6 +24,7 @@ IMPORTED_AS = {
     "dask": "distributed",
     "mcap": "mcap-ros2-support",  # brings it
     "mcap_ros2": "mcap-ros2-support",
+    "sklearn": "scikit-learn",
 }
 
 
