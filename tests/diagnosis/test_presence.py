@@ -8,8 +8,12 @@ import fric
 import numpy as np
 import pytest
 from fric.diagnosis.additive.asked import Asked
+from fric.diagnosis.calibration import Evidence
+from fric.diagnosis.findings import with_presences
 from fric.diagnosis.fitting import refit
-from fric.diagnosis.presence import Presence, presences
+from fric.diagnosis.locate import Where
+from fric.diagnosis.presence import Half, Presence, presences
+from fric.diagnosis.result import Estimate, Finding
 from fric.diagnosis.settle import Step
 from fric.diagnosis.start import started
 from fric.diagnosis.track import Track
@@ -78,3 +82,13 @@ def test_what_flexible_functions_explain_as_well_is_not_asked_for(fitted: Fitted
     nats = {name: asked.nats(k) for k, name in enumerate(model.prefixes)}
     assert nats["ripple"] > 30.0
     assert nats["quadratic_drag"] < 3.0
+
+
+@pytest.mark.parametrize(("error", "most"), [(0.1, 1.0), (3.0, 0.45)])
+def test_what_is_smaller_than_its_own_standard_error_is_not_told_as_likely(error: float, most: float) -> None:
+    step = Step("ripple", 1.0, 0.1, 0.0, 1.0, (), ())
+    nowhere = Where((((0.0, 1.0),),), 1.0, "", "speed", (0.0, 1.0), 1.0)
+    values = {"ripple.cosine": Estimate(2.0, error, "N")}
+    told = Finding("ripple", "", "ripple", 0.9, None, nowhere, "load", 0.9, "", values, 2.0, 0.1)
+    sure = Presence(0.97, (Half(9.0, {}), Half(9.0, {})), Evidence(0.9, 0.0, 9.0))
+    assert with_presences({"ripple": sure}, [told], [step])[0].confidence == min(0.97, most)

@@ -51,19 +51,23 @@ _STANDS_OUT = 3.0  # times the floor: with less, noise is more than a quarter of
 _UNDECIDED = 0.45  # confidence at most, where no parameter of an effect is as large as its own standard error
 
 
-def with_presences(sure: Mapping[str, Presence], findings: Sequence[Finding], steps: Sequence[Step]) -> list[Finding]:
+def with_presences(present: Mapping[str, Presence], findings: Sequence[Finding], steps: Sequence[Step]) -> list[Finding]:
     """``findings``, each as sure as what speaks for it makes it (:mod:`.presence`)."""
-    by_effect = {step.term.split("#")[0]: sure[step.term] for step in steps}
+    by_effect = {step.term.split("#")[0]: present[step.term] for step in steps}
     held = []
     for each in findings:
         found = by_effect[each.effect]
+        sure = min(found.probability, _UNDECIDED) if _undecided(each.parameters) else found.probability
         runner = each.runner_up
         if runner is not None:
-            runner = replace(runner, confidence=round(min(1.0 - found.probability, found.probability), 4))
-        held.append(
-            replace(each, confidence=found.probability, runner_up=runner, reproduced=found.halves, weighed=found.evidence)
-        )
+            runner = replace(runner, confidence=round(min(1.0 - sure, sure), 4))
+        held.append(replace(each, confidence=sure, runner_up=runner, reproduced=found.halves, weighed=found.evidence))
     return held
+
+
+def _undecided(parameters: Mapping[str, Estimate]) -> bool:
+    """True where no parameter of an effect is as large as its own standard error."""
+    return bool(parameters) and all(each.std is not None and abs(each.value) < each.std for each in parameters.values())
 
 
 def reservations(growth: Growth, nominal: Model, far_off: bool, bent: Sequence[Term]) -> list[str]:
@@ -123,7 +127,7 @@ def finding_of(
         for p in end.parameters()
         if p.name.startswith(f"{step.term}.")
     }
-    if parameters and all(each.std is not None and abs(each.value) < each.std for each in parameters.values()):
+    if _undecided(parameters):
         sure = min(sure, _UNDECIDED)
     runner = RunnerUp(rival.effect.id, round(min(1.0 - sure, sure), 4)) if rival is not None else None
     return Finding(
