@@ -14,6 +14,7 @@ from ..record import Array
 from ..threads import mapped
 from .along import Along
 from .candidates import Scales, fewest_cycles, scales_of
+from .indifference import dearer
 from .least_squares import Bounds, Fit
 from .screen import Gram, Tried, blocks_of, restraint
 from .track import Track
@@ -29,6 +30,7 @@ __all__ = [
     "bounds_of",
     "free_names",
     "is_driven",
+    "left_by",
     "refit",
     "shaken",
     "unseen",
@@ -62,7 +64,7 @@ class State:
 
     Attributes:
         fit: to all blocks.
-        left: sum of squares on unseen blocks [F^2].
+        left: sum of squares on unseen blocks [F^2], the more where the model minds the effort less.
         floor: the same on twins of the model, their mean [F^2].
         chance: residuals of the twins, shape ``(n,)`` each [F].
     """
@@ -94,7 +96,12 @@ def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
     made = twins(track, fit.model, _TWINS)
     chance = tuple(track.residual(fit.model, twin) for twin in made)
     floor = float(np.mean([unseen(track, fit, each) for each in chance]))
-    return State(fit, unseen(track, fit, fit.residual), floor, chance)
+    return State(fit, left_by(track, fit), floor, chance)
+
+
+def left_by(track: Track, fit: Fit) -> float:
+    """What a fitted model leaves on unseen blocks [F^2], the more where it minds the effort less (:mod:`.indifference`)."""
+    return unseen(track, fit, fit.residual) * dearer(track, fit.model)
 
 
 def unseen(track: Track, fit: Fit, residual: Array, apart: str = "") -> float:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from ..model import Model
 from .candidates import candidates, scales_of
 from .fitting import State, refit
+from .indifference import dearer
 from .price import PER_PARAMETER, implausible
 from .rival import Rival
 from .screen import Tried, screen
@@ -78,9 +79,11 @@ class Growth:
 
     @property
     def dear(self) -> float:
-        """The price of its parameters, and of what is implausible about it."""
+        """The price of its parameters, of what is implausible about it, and of how little it minds the effort."""
+        minded = self.end.left / dearer(self.track, self.end.fit.model)
+        unminded = (self.end.left - minded) / max(self.begin.excess, 1e-300)
         n = sum(not p.shape for held in self.end.fit.model.terms for p in held.effect.parameters)
-        return PER_PARAMETER * n + implausible(self.track.masses, self.end.fit.model)
+        return PER_PARAMETER * n + implausible(self.track.masses, self.end.fit.model) + unminded
 
 
 def share_left(growth: Growth) -> float:

@@ -103,7 +103,7 @@ def presences(
         halves = []
         for rows, (values, lacks) in zip((first, ~first), with_all, strict=True):
             ratio = max(_on_other(track, without, rows, white)[1], 1e-300) / max(lacks, 1e-300)
-            nats = 0.5 * float(np.sum(~rows)) / white.stride * math.log(ratio)
+            nats = float(np.sum(~rows)) / white.stride * (0.5 * math.log(ratio) - asked.indifferent(place))
             halves.append(Half(nats, {name: value for name, value in values.items() if name.startswith(f"{step.term}.")}))
         least = min(each.nats for each in halves)
         functions = asked.nats(place)

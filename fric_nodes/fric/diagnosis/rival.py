@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from ..effect import Effect
 from ..model import Model
-from .fitting import State, unseen
+from .fitting import State, left_by
 from .least_squares import Fit
 from .price import implausible, price_of
 from .screen import Screening, Tried
@@ -70,7 +70,7 @@ def rival_of(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, fou
         found: the screening that it comes from.
     """
     effects = [each.column.term.effect for each in offer]
-    left = unseen(track, fit, fit.residual) * (found.unpaid if brings_slip(offer) else 1.0)
+    left = left_by(track, fit) * (found.unpaid if brings_slip(offer) else 1.0)
     dear = sum(price_of(effect, state.excess) for effect in effects) + state.excess * implausible(track.masses, fit.model)
     names = [name_of(fit.model, effect) for effect in effects]
     halfway = min((each.left for each in offer), default=left)

@@ -53,6 +53,8 @@ class Runs:
         past: what came before each run, if it is a part of one: models that remember for longer are led along it.
         late: part of a sample by which the force acts after its stamps, where its hold isn't known.
         given: mass that the axis is said to have [F s^2/x]; None where nothing else is said than ``mass``.
+        noticeable: root mean square of the force that the nominal model lacks, and of what noise leaves [F]; None where
+            nothing was fitted yet.
     """
 
     runs: tuple[Run, ...]
@@ -66,6 +68,7 @@ class Runs:
     past: tuple[Past | None, ...]
     late: float = 0.0
     given: float | None = None
+    noticeable: tuple[float, float] | None = None
 
     @classmethod
     def of(cls, records: Sequence[Record], bandwidth: float, model: Model, late: float = 0.0) -> Self:

@@ -22,6 +22,7 @@ from .candidates import scales_of
 from .fitting import bounds_of, free_names
 from .price import FAR_OFF, mass_off
 from .track import Track
+from .twin import twins
 
 __all__ = [
     "BANDWIDTHS",
@@ -75,7 +76,15 @@ def started(nominal: Model, train: Sequence[Record], as_given: bool = False) -> 
         # Where so much is missing that it makes up a mass of its own, the one given is the better measure.
         tracks = [replace(track, mass=nominal.total_inertia) for track in tracks]
     # Lag and viscous friction that are left out can make up a mass, too: what is plausible beside either is plausible.
-    return [replace(track, given=nominal.total_inertia) for track in tracks], best.model
+    given = nominal.total_inertia
+    return [replace(track, given=given, noticeable=_noticeable(track, best.model)) for track in tracks], best.model
+
+
+def _noticeable(track: Track, model: Model) -> tuple[float, float]:
+    """Root mean square of the force that ``model`` lacks, and of what a twin leaves [F]."""
+    lacking = track.residual(model)
+    hidden = track.residual(model, *twins(track, model, 1))
+    return float(np.sqrt(np.mean(lacking**2))), float(np.sqrt(np.mean(hidden**2)))
 
 
 def _by_inverse_dynamics(model: Model, train: Sequence[Record]) -> Model | None:

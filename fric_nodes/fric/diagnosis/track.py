@@ -93,6 +93,14 @@ class Track(Runs):
         # The impulses are those of one mass, whatever mass the model has: a light model must not be led with less force.
         return self._followed(model, self.mass, twin)
 
+    def with_effort(self, added: float) -> Twin:
+        """The recordings themselves, with ``added`` to their effort [F]."""
+        return Twin(
+            tuple(run.effort + added for run in self.runs),
+            tuple(run.position for run in self.runs),
+            tuple(np.zeros_like(run.effort) for run in self.runs),
+        )
+
     def unpaid(self, model: Model) -> float:
         """By how much less energy ``model`` seems to lack when its position is set instead of pushed; at least 1.
 

@@ -15,6 +15,7 @@ import numpy as np
 from ...record import Array
 from ..candidates import scales_of
 from ..fitting import State, bounds_of, free_names, without_place
+from ..indifference import indifference
 from ..least_squares import Fit
 from ..track import Track
 from .evidence import Grouped
@@ -66,4 +67,9 @@ class Asked:
         before = grouped.weighed(beside)
         start = dict(zip(before.groups, before.sizes, strict=True))
         after = grouped.weighed([*beside, _TERM], start, float(np.log(before.noise / grouped.size)))
-        return independent_share(grouped.residual(after)) * (after.log_evidence - before.log_evidence)
+        share = independent_share(grouped.residual(after))
+        return share * (after.log_evidence - before.log_evidence - grouped.n * self.indifferent(place))
+
+    def indifferent(self, place: int) -> float:
+        """By how much less the model minds the effort for its term number ``place`` [nats per value], below 0 for more."""
+        return indifference(self._track, self._state.fit.model) - indifference(self._track, self.without(place).model)
