@@ -105,13 +105,7 @@ def diagnose(
     if any(each.effect == "unknown" for each in found.findings):
         tell("weighing what is left by the components of the machine")
         found = replace(found, components=by_component(searched, found.model))
-    if massless and not _holds_inertia(found, nominal, train):
-        raise DiagnosisError(
-            train[0].source,
-            f"the force doesn't hold the inertia of the model's mass {nominal.total_inertia:.3g}",
-            "where the force is measured at the contact, make its plant 'contact'; else look at unit and sign (fric doctor)",
-        )
-    return found
+    return _with_inertia(found, nominal, train) if massless else found
 
 
 def _for_the_same(train: Sequence[Record], validation: Sequence[Record], nominal: Model) -> Iterator[str]:
@@ -153,14 +147,28 @@ def refit_noe(model: Model, train: Sequence[Record], validation: Sequence[Record
     return 100.0 * float(left @ left) / spread_of(held)
 
 
+def _with_inertia(found: Diagnosis, nominal: Model, train: Sequence[Record]) -> Diagnosis:
+    """What was found where hardly any mass fitted the force as it was; with a note, where something unknown hides the inertia.
+
+    Raises:
+        DiagnosisError: it is a full explanation, but not of a force that moves the body.
+    """
+    what = f"the force doesn't hold the inertia of the model's mass {nominal.total_inertia:.3g}"
+    do = "where the force is measured at the contact, make its plant 'contact'; else look at unit and sign (fric doctor)"
+    if not found.findings or found.findings[0].effect == "unknown":
+        return replace(found, notes=(*found.notes, f"refitted without what is missing, {what}; {do}"))
+    if not _holds_inertia(found, nominal, train):
+        raise DiagnosisError(train[0].source, what, do)
+    return found
+
+
 def _holds_inertia(found: Diagnosis, nominal: Model, train: Sequence[Record]) -> bool:
-    """Whether the force is the one that moves the body, where hardly any mass fitted it as it was: with all that is found.
+    """Whether the force is the one that moves the body, with all that is found.
 
     Observers count what a body lacks in the force that moves it: one without mass never lacks anything. And a limit or a dead
     zone that swallows nearly all of the force says the same in other words.
     """
-    named = bool(found.findings) and found.findings[0].effect != "unknown"
-    if not named or implausible((nominal.total_inertia,), found.model) > FAR_OFF:
+    if implausible((nominal.total_inertia,), found.model) > FAR_OFF:
         return False
     effort = np.concatenate([record.effort[record.mask] for record in train])
     passed = effort[:: max(effort.shape[0] // _LOOKED_AT, 1)]
