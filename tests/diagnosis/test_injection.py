@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import fric
 import numpy as np
 import pytest
-from fric.diagnosis.prove.injection import CHANGED, INJECTED, Injected, examined, injected, injections
+from fric.diagnosis.prove.calibrating import trials_of
+from fric.diagnosis.prove.injection import CHANGED, INJECTED, Injected, injected, injections
+from fric.diagnosis.prove.injection_exam import examined
 from fric.effects import EFFECTS
+from fric.errors import InputError
 from fric.model import build_model, term
 from fric.record import Record
 
@@ -71,7 +75,15 @@ def test_the_axis_with_the_effect_moves_the_same_under_the_changed_effort(effect
 
 
 @pytest.mark.long
-def test_what_is_injected_is_found(record: Record) -> None:
-    bare, outcomes = examined([record], NOMINAL, [6.0], 6, lambda _: None, ["stiffness", "quadratic_drag"])
+def test_what_is_injected_is_found_and_an_examination_goes_on_in_its_folder(record: Record, tmp_path: Path) -> None:
+    wanted, told = [Injected("stiffness", 6.0), Injected("quadratic_drag", 6.0)], list[str]()
+    bare, outcomes = examined([record], NOMINAL, wanted[:1], 6, tmp_path, told.append, jobs=1)
     assert not bare.mismatch
-    assert all(each.found and not each.wrong for each in outcomes)
+    assert sum("diagnosed" in each for each in told) == 1
+    _, outcomes = examined([record], NOMINAL, wanted, 6, tmp_path, told.append, jobs=1)
+    assert sum("diagnosed" in each for each in told) == 2
+    assert all(each.found and not each.wrong and not each.failure for each in outcomes)
+    trials = list(trials_of(tmp_path))
+    assert [each.effect for each in trials if each.right] == ["quadratic_drag", "stiffness"]
+    with pytest.raises(InputError, match="holds an examination of other recordings"):
+        examined([record], NOMINAL, wanted, 5, tmp_path, told.append)

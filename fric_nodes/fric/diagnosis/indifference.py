@@ -17,19 +17,16 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from ..model import Model
-from ..record import Array
 from ..threads import mapped
 
 if TYPE_CHECKING:
     from .track import Track
 
 __all__ = ["dearer", "indifference"]
-
-_SETTLES = 4.0  # time constants of the observer, over which it still shows a turn or a rest
-_ALL = 1.0 - 1e-3  # numerical: a share of the added force that counts as all of it
 
 
 def indifference(track: Track, model: Model) -> float:
@@ -46,7 +43,7 @@ def indifference(track: Track, model: Model) -> float:
         return 0.0
     less, more = mapped(lambda added: track.residual(model, track.with_effort(added)), (-size, size))
     shown = np.clip((less - more) / (2.0 * size), hidden / size, 1.0)
-    return float(np.mean(np.where(_moves(track) & (shown < _ALL), -np.log(shown), 0.0)))
+    return float(np.mean(np.where(_moves(track), -np.log(shown), 0.0)))
 
 
 def dearer(track: Track, model: Model) -> float:
@@ -54,12 +51,11 @@ def dearer(track: Track, model: Model) -> float:
     return math.exp(2.0 * indifference(track, model))
 
 
-def _moves(track: Track) -> Array:
+def _moves(track: Track) -> NDArray[np.bool_]:
     """True for the values of a residual at which the axis moves, and has done so for a while; shape ``(n,)``."""
     parts = []
-    for k, run in enumerate(track.runs):
+    for k in range(len(track.runs)):
         velocity = track.motion[k].velocity
         rests = (np.abs(velocity) <= track.rest(k)) | (np.diff(np.sign(velocity), append=0.0) != 0.0)
-        reach = math.ceil(_SETTLES / (track.bandwidth * run.sample_time))
-        parts.append(~binary_dilation(rests, iterations=reach))
-    return track.joined(parts)
+        parts.append((~binary_dilation(rests, iterations=track.settled(k))).astype(np.float64))
+    return np.asarray(track.joined(parts), dtype=np.bool_)

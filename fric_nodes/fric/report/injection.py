@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..diagnosis.prove.injection import InjectionOutcome
+from ..diagnosis.prove.injection_exam import InjectionOutcome
 from ..diagnosis.result import Diagnosis
 from .numbers import significant
 from .page import Section, paragraph, render, table
@@ -27,7 +27,7 @@ def injection_page(bare: Diagnosis, outcomes: Sequence[InjectionOutcome], comman
             f"{each.what.times:g}",
             f"{significant(each.rms, 3)} {unit}",
             f"{100 * each.presence:.0f} %",
-            "found" if each.found else "not found",
+            each.failure or ("found" if each.found else "not found"),
             ", ".join(each.wrong),
         )
         for each in outcomes

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from fric.errors import InputError
 
-from .options import JsonOption, OutOption, progress
+from .groups import grouped
+from .options import JsonOption, OutOption, Reading, ReadingGroup, progress, read_all
+
+if TYPE_CHECKING:
+    from fric.diagnosis.prove.injection import Injected
 
 __all__ = ["register"]
 
@@ -20,6 +25,7 @@ def register(app: typer.Typer) -> None:
     app.command("prove", no_args_is_help=True, epilog="Example: fric prove --cases 300 --seed 1 --out proof")(prove)
 
 
+@grouped
 def prove(
     out: OutOption,
     cases: Annotated[int, typer.Option("--cases", help="Number of simulated axes.")] = 300,
@@ -46,6 +52,9 @@ def prove(
         str, typer.Option("--sizes", help="With --inject: sizes, as multiples of the force that stays unexplained.")
     ] = "3,6",
     only: Annotated[str, typer.Option("--only", help="With --inject: effects, separated by commas. If not given: all.")] = "",
+    blocks: Annotated[
+        int, typer.Option("--blocks", help="With --inject: parts of each recording; every other one is kept for the test.")
+    ] = 10,
     calibrate: Annotated[
         list[Path] | None,
         typer.Option(
@@ -53,6 +62,7 @@ def prove(
             help="Learn how sure effects are from this examination. May be repeated.",
         ),
     ] = None,
+    reading: ReadingGroup = Reading(),
     as_json: JsonOption = False,
 ) -> None:
     """Measure how often the diagnosis is right; exit status 1 when a goal is missed. A stopped run continues in its folder."""
@@ -60,7 +70,7 @@ def prove(
         _calibrate(calibrate, out)
         return
     if inject or model is not None:
-        _inject(inject or [], model, sizes, only, out, as_json)
+        _inject(inject or [], model, Injections(sizes, only, blocks, jobs), reading, out, as_json)
         return
     _examine(cases, seed, variant, jobs, out, as_json)
 
@@ -126,13 +136,19 @@ def _calibrate(examinations: list[Path], out: Path) -> None:
     typer.echo(f"written: {out / 'calibration.json'}")
 
 
-_BLOCKS = 10
+@dataclass(frozen=True)
+class Injections:
+    """What is concealed in recordings, as it was given: sizes and effects, separated by commas; and how it is diagnosed."""
+
+    sizes: str
+    only: str
+    blocks: int
+    jobs: int | None
 
 
-def _inject(recordings: list[Path], model: Path | None, sizes: str, only: str, out: Path, as_json: bool) -> None:
+def _inject(recordings: list[Path], model: Path | None, asked: Injections, reading: Reading, out: Path, as_json: bool) -> None:
     """Effects concealed in recordings; the page and ``injection.json`` go into ``out``."""
-    import fric
-    from fric.diagnosis.prove.injection import examined, injections
+    from fric.diagnosis.prove.injection_exam import examined
     from fric.files import write_text
     from fric.model_file import read_model
     from fric.report.injection import injection_page
@@ -141,22 +157,10 @@ def _inject(recordings: list[Path], model: Path | None, sizes: str, only: str, o
         raise InputError(
             "--inject" if model is None else "--model", "needs the other of the two", "give --inject BAG --model M"
         )
-    try:
-        wanted = [float(each) for each in sizes.split(",")]
-    except ValueError:
-        wanted = []
-    if not wanted or not all(math.isfinite(each) and each > 0.0 for each in wanted):
-        raise InputError("--sizes", f"'{sizes}' isn't a list of numbers above 0", "give for example --sizes 3,6")
-    names = [each for each in only.split(",") if each]
-    known = {each.effect for each in injections(wanted)}
-    if set(names) - known:
-        raise InputError(
-            "--only", f"'{', '.join(sorted(set(names) - known))}' can't be injected", f"one of {', '.join(sorted(known))}"
-        )
-    records = [fric.read(each) for each in recordings]
-    bare, outcomes = examined(records, read_model(model), wanted, _BLOCKS, progress, names)
+    wanted = _wanted(asked.sizes, asked.only)
+    records = read_all(recordings, reading)
+    bare, outcomes = examined(records, read_model(model), wanted, asked.blocks, out, progress, asked.jobs)
     command = f"fric prove {' '.join(f'--inject {each.name}' for each in recordings)} --model {model.name} --out {out.name}"
-    out.mkdir(parents=True, exist_ok=True)
     write_text(out / "injection.html", injection_page(bare, outcomes, command))
     result = {
         "found": sum(each.found for each in outcomes),
@@ -169,6 +173,7 @@ def _inject(recordings: list[Path], model: Path | None, sizes: str, only: str, o
                 "rms": each.rms,
                 "presence": each.presence,
                 "wrong": list(each.wrong),
+                "failure": each.failure,
             }
             for each in outcomes
         ],
@@ -181,3 +186,27 @@ def _inject(recordings: list[Path], model: Path | None, sizes: str, only: str, o
         f"{result['found']} of {len(outcomes)} concealed effects found; in {result['with_wrong_names']} another was named"
     )
     typer.echo(f"written: {out / 'injection.html'}")
+
+
+def _wanted(sizes: str, only: str) -> list[Injected]:
+    """The injections that are asked for.
+
+    Raises:
+        InputError: no numbers, or no effects that can be injected.
+    """
+    from fric.diagnosis.prove.injection import injections
+
+    try:
+        found = [float(each) for each in sizes.split(",")]
+    except ValueError:
+        found = []
+    if not found or not all(math.isfinite(each) and each > 0.0 for each in found):
+        raise InputError("--sizes", f"'{sizes}' isn't a list of numbers above 0", "give for example --sizes 3,6")
+    names = {each for each in only.split(",") if each}
+    every = injections(found)
+    known = {each.effect for each in every}
+    if names - known:
+        raise InputError(
+            "--only", f"'{', '.join(sorted(names - known))}' can't be injected", f"one of {', '.join(sorted(known))}"
+        )
+    return [each for each in every if not names or each.effect in names]

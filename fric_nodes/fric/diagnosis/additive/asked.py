@@ -68,7 +68,7 @@ class Asked:
         start = dict(zip(before.groups, before.sizes, strict=True))
         after = grouped.weighed([*beside, _TERM], start, float(np.log(before.noise / grouped.size)))
         share = independent_share(grouped.residual(after))
-        return share * (after.log_evidence - before.log_evidence - grouped.n * self.indifferent(place))
+        return float(share * (after.log_evidence - before.log_evidence - grouped.n * self.indifferent(place)))
 
     def indifferent(self, place: int) -> float:
         """By how much less the model minds the effort for its term number ``place`` [nats per value], below 0 for more."""

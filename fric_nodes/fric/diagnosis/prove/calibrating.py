@@ -20,6 +20,7 @@ from scipy.optimize import minimize
 from ...errors import InputError
 from ...record import Array
 from ..calibration import FORMAT, Calibration, Evidence, measures_of
+from .injection_exam import told_in
 from .scoring import calibration_bins
 from .sealing import case_folder, open_key, published
 
@@ -43,9 +44,19 @@ class Trial:
 def trials_of(out: Path) -> Iterator[Trial]:
     """The findings of the examination in the folder ``out``, but those of something unknown.
 
+    Of recordings of a real axis with an effect concealed in them, what was named in these as they are may be there or not: it
+    is no trial. They all are one case.
+
     Raises:
         InputError: it holds none.
     """
+    for told in told_in(out):
+        concealed = told["injected"]["effect"]
+        for each in told["findings"]:
+            if each["weighed"] and (each["effect"] == concealed or each["effect"] not in told["own"]):
+                yield Trial(each["effect"], _evidence(each["weighed"]), each["effect"] == concealed, str(out))
+    if next(told_in(out), None) is not None:
+        return
     if published(out) is None:
         raise InputError(out, "holds no examination", "give a folder that 'fric prove --out FOLDER' has written")
     for key in open_key(out):
@@ -53,11 +64,13 @@ def trials_of(out: Path) -> Iterator[Trial]:
         findings = json.loads(at.read_text(encoding="utf-8"))["findings"] if at.exists() else []
         for each in findings:
             if each.get("weighed"):
-                weighed: dict[str, Any] = {
-                    name: math.inf if value is None else value for name, value in each["weighed"].items()
-                }
-                evidence = Evidence(**weighed)
-                yield Trial(each["effect"], evidence, each["effect"] in key["effects"], str(case_folder(out, key["number"])))
+                right, case = each["effect"] in key["effects"], str(case_folder(out, key["number"]))
+                yield Trial(each["effect"], _evidence(each["weighed"]), right, case)
+
+
+def _evidence(weighed: dict[str, Any]) -> Evidence:
+    held: dict[str, Any] = {name: math.inf if value is None else value for name, value in weighed.items()}
+    return Evidence(**held)
 
 
 def learnt(outs: Sequence[Path]) -> dict[str, Any]:
@@ -86,6 +99,9 @@ def off_on_others(trials: Sequence[Trial]) -> float:
 
 def _provenance(out: Path) -> dict[str, Any]:
     """Where the trials of a folder come from."""
+    injections = len(list(told_in(out)))
+    if injections:
+        return {"injections": injections, **json.loads((out / "examined.json").read_text(encoding="utf-8"))}
     orders = json.loads((out / "plan.json").read_text(encoding="utf-8"))
     diagnosed = sum((case_folder(out, order["number"]) / "report.json").exists() for order in orders)
     return {"cases": diagnosed, "variant": orders[0]["variant"], "sha256": published(out)}

@@ -24,7 +24,7 @@ from .cases import Order, plan
 from .scoring import Outcome, Score, outcome_of, scored
 from .sealing import case_folder, open_key, published, seal, set_up
 
-__all__ = ["Examination", "hold"]
+__all__ = ["Examination", "hold", "in_processes"]
 
 Progress = Callable[[str], None]
 Result = TypeVar("Result")
@@ -120,6 +120,21 @@ def _finished(folder: Path, hash_of_key: str) -> bool:
 def _pool(workers: int) -> ProcessPoolExecutor:
     """Fresh processes, of one thread each, that share nothing with this one; none is started before there is work."""
     return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=alone)
+
+
+def in_processes(
+    work: Callable[..., Result], tasks: Sequence[tuple[Any, ...]], progress: Progress, what: str, jobs: int | None = None
+) -> list[Result]:
+    """``work`` for every task, in the tasks' order, in fresh processes; ``jobs`` of them, one per core when None.
+
+    Raises:
+        InputError: less than one.
+    """
+    workers = jobs or os.cpu_count() or 1
+    if workers < 1:
+        raise InputError("--jobs", f"{workers} is too few", "ask for at least one")
+    with _pool(workers) as pool:
+        return _all(pool, work, tasks, progress, what)
 
 
 def _all(

@@ -18,14 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from ...model import Model
 from ...record import Array, Record
-from ..blocks import in_blocks
-from ..confidence import AS_LIKELY
-from ..diagnose import diagnose
-from ..result import Diagnosis
 
-__all__ = ["CHANGED", "INJECTED", "Injected", "InjectionOutcome", "examined", "injected", "injections"]
+__all__ = ["CHANGED", "INJECTED", "Injected", "injected", "injections"]
 
 _CUTOFF = 40.0  # physical [Hz]: where axes' friction changes with their motion
 _REST = 0.01  # physical, of fast motion: below, the axis may rest, where friction balances whatever is left
@@ -109,28 +104,6 @@ class Injected:
     times: float
 
 
-@dataclass(frozen=True)
-class InjectionOutcome:
-    """What the diagnosis said of one.
-
-    Attributes:
-        what: was injected.
-        rms: root mean square of the added force where it acts [F].
-        presence: of the injected effect; 0 where it isn't named.
-        wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor the axis's own.
-    """
-
-    what: Injected
-    rms: float
-    presence: float
-    wrong: tuple[str, ...]
-
-    @property
-    def found(self) -> bool:
-        """True where it is named as more likely there than not."""
-        return self.presence >= AS_LIKELY
-
-
 def injections(sizes: Sequence[float]) -> list[Injected]:
     """Every effect in every size."""
     return [Injected(effect, size) for effect in (*INJECTED, *CHANGED) for size in sizes]
@@ -164,46 +137,6 @@ def injected(records: Sequence[Record], what: Injected, rest: float) -> tuple[li
         effort = record.effort + size * force if changing is None else changing.effort(record, motion, size)
         changed.append(replace(record, effort=effort))
     return changed, what.times * rest
-
-
-def examined(
-    records: Sequence[Record],
-    nominal: Model,
-    sizes: Sequence[float],
-    n_blocks: int,
-    progress: Callable[[str], None],
-    only: Sequence[str] = (),
-) -> tuple[Diagnosis, list[InjectionOutcome]]:
-    """The diagnosis of ``records`` as they are, and of every injection into them.
-
-    Args:
-        records: of one axis.
-        nominal: what the diagnosis starts from.
-        sizes: multiples of what stays unexplained.
-        n_blocks: into which each recording is cut, every other one held back.
-        progress: told what goes on.
-        only: effects; none are all.
-    """
-    progress("diagnosing the recordings as they are")
-    bare = diagnose(*in_blocks(records, n_blocks), nominal)
-    own = {each.effect for each in bare.findings if each.confidence >= AS_LIKELY}
-    errors = bare.force_errors
-    rest = errors[1] if errors is not None else 0.0
-    outcomes = []
-    for what in injections(sizes):
-        if only and what.effect not in only:
-            continue
-        changed, rms = injected(records, what, rest)
-        found = diagnose(*in_blocks(changed, n_blocks), nominal)
-        sure = {each.effect: each.confidence for each in found.findings}
-        wrong = tuple(sorted(e for e, c in sure.items() if c >= AS_LIKELY and e not in {what.effect, "unknown", *own}))
-        outcomes.append(InjectionOutcome(what, rms, sure.get(what.effect, 0.0), wrong))
-        last = outcomes[-1]
-        progress(
-            f"{what.effect}, {what.times:g} times the rest: {'found' if last.found else 'not found'} "
-            f"({100 * last.presence:.0f} %){'; wrong: ' + ', '.join(wrong) if wrong else ''}"
-        )
-    return bare, outcomes
 
 
 def _motion(record: Record) -> Motion:

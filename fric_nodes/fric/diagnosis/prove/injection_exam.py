@@ -1,0 +1,143 @@
+"""The diagnosis examined on effects that were concealed in recordings of a real axis (:mod:`.injection`).
+
+Each is diagnosed in a process of its own pool, and written down when it is done: a stopped examination goes on in its folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError
+from ...files import write_text
+from ...model import Model
+from ...model_file import model_to_text
+from ...record import Record
+from ..blocks import in_blocks
+from ..confidence import AS_LIKELY
+from ..diagnose import diagnose
+from ..result import Diagnosis, Finding
+from .examination import in_processes
+from .injection import Injected, injected
+
+__all__ = ["InjectionOutcome", "examined", "told_in"]
+
+_FOLDER = "injected"
+
+
+@dataclass(frozen=True)
+class InjectionOutcome:
+    """What the diagnosis said of one.
+
+    Attributes:
+        what: was injected.
+        rms: root mean square of the added force where it acts [F].
+        presence: of the injected effect; 0 where it isn't named.
+        wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor the axis's own.
+        failure: why there is no diagnosis; empty where there is one.
+    """
+
+    what: Injected
+    rms: float
+    presence: float
+    wrong: tuple[str, ...]
+    failure: str = ""
+
+    @property
+    def found(self) -> bool:
+        """True where it is named as more likely there than not."""
+        return self.presence >= AS_LIKELY
+
+
+def examined(
+    records: Sequence[Record],
+    nominal: Model,
+    wanted: Sequence[Injected],
+    n_blocks: int,
+    out: Path,
+    progress: Callable[[str], None],
+    jobs: int | None = None,
+) -> tuple[Diagnosis, list[InjectionOutcome]]:
+    """The diagnosis of ``records`` as they are, and of every injection into them.
+
+    Args:
+        records: of one axis.
+        nominal: what the diagnosis starts from.
+        wanted: what is concealed, one at a time.
+        n_blocks: into which each recording is cut, every other one held back.
+        out: folder; one that holds the same examination is gone on with.
+        progress: told what goes on.
+        jobs: worker processes; as many as there are cores when None.
+
+    Raises:
+        InputError: the folder holds another examination.
+    """
+    _claim(out, records, nominal, n_blocks)
+    progress("diagnosing the recordings as they are")
+    bare = diagnose(*in_blocks(records, n_blocks), nominal)
+    own = tuple(sorted({each.effect for each in bare.findings}))
+    rest = bare.force_errors[1] if bare.force_errors is not None else 0.0
+    waiting = [what for what in wanted if not _at(out, what).exists()]
+    tasks = [(str(_at(out, what)), what, records, nominal, rest, n_blocks, own) for what in waiting]
+    in_processes(_diagnosed, tasks, progress, "diagnosed", jobs)
+    return bare, [_outcome(json.loads(_at(out, what).read_text(encoding="utf-8"))) for what in wanted]
+
+
+def told_in(out: Path) -> Iterator[dict[str, Any]]:
+    """What each diagnosis in the folder ``out`` said: ``injected``, ``own`` and ``findings``; nothing where it holds none."""
+    for at in sorted((out / _FOLDER).glob("*.json")):
+        yield json.loads(at.read_text(encoding="utf-8"))
+
+
+def _at(out: Path, what: Injected) -> Path:
+    return out / _FOLDER / f"{what.effect}_{what.times:g}.json"
+
+
+def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int) -> None:
+    """Write down of what it is, or check that the folder holds the same."""
+    told = hashlib.sha256(f"{model_to_text(nominal)} {n_blocks}".encode())
+    for record in records:
+        for each in (record.time, record.position, record.effort, record.mask):
+            told.update(each.tobytes())
+    at, text = out / "examined.json", json.dumps({"sha256": told.hexdigest()})
+    if at.exists() and at.read_text(encoding="utf-8") != text:
+        raise InputError(out, "holds an examination of other recordings", "choose another folder, or the same options")
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(at, text)
+
+
+def _diagnosed(
+    at: str, what: Injected, records: Sequence[Record], nominal: Model, rest: float, n_blocks: int, own: Sequence[str]
+) -> None:
+    """Diagnose ``records`` with ``what`` concealed in them, and write down what was said."""
+    changed, rms = injected(records, what, rest)
+    failure = ""
+    findings: tuple[Finding, ...] = ()
+    try:
+        findings = diagnose(*in_blocks(changed, n_blocks), nominal).findings
+    except InputError as error:
+        failure = str(error)
+    told = {"injected": asdict(what), "rms": rms, "own": list(own), "failure": failure, "findings": [*map(_said, findings)]}
+    Path(at).parent.mkdir(parents=True, exist_ok=True)
+    write_text(Path(at), json.dumps(told, indent=1))
+
+
+def _said(finding: Finding) -> dict[str, Any]:
+    weighed = None
+    if finding.weighed is not None:
+        weighed = {name: value if math.isfinite(value) else None for name, value in asdict(finding.weighed).items()}
+    return {"effect": finding.effect, "confidence": finding.confidence, "weighed": weighed}
+
+
+def _outcome(told: dict[str, Any]) -> InjectionOutcome:
+    what = Injected(**told["injected"])
+    sure: dict[str, float] = {}
+    for each in told["findings"]:
+        sure[each["effect"]] = max(each["confidence"], sure.get(each["effect"], 0.0))
+    wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in {what.effect, "unknown", *told["own"]})
+    return InjectionOutcome(what, told["rms"], sure.get(what.effect, 0.0), tuple(sorted(wrong)), told["failure"])
