@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from .candidates import candidates, scales_of
+from .deadline import is_over
 from .fitting import NOTHING, State, best_track, refit
 from .growth import LITTLE, Growth, screened
 from .laws import with_best_laws
@@ -52,7 +53,7 @@ def extended_by_terms(
     steps, last, beginnings = list(growth.steps), growth.last, growth.beginnings
     floors = {each.bandwidth: refit(each, begin.fit.model, max_iterations=4).floor for each in tracks}
     ended = True
-    while first is not None or len(steps) < most:
+    while first is not None or (len(steps) < most and not is_over()):
         if first is not None:
             rivals, last, first = [first], first.screened, None
         else:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from ..model import Model
 from .adding import settled_again
 from .additive.together import grown_together, middle_of
+from .deadline import is_over
 from .fitting import State, added, refit, without_place
 from .grow import grown_faster
 from .growth import AGAIN, LITTLE, Growth, fast_observer, left_to_a_fast_observer, screened
@@ -124,7 +125,7 @@ def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None])
     track = growth.track
     found = fast_observer(tracks, growth.begin.fit.model)
     faster = found is not None and found[0].bandwidth > track.bandwidth
-    if growth.together is growth.end and not faster:
+    if is_over() or (growth.together is growth.end and not faster):
         return growth  # it is what growing together came to: once more it would come to the same
     tell("looking for what helps beside it")
     start = replace(growth, slower=False, beyond=0.0)

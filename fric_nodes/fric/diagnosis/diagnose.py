@@ -24,6 +24,7 @@ from .at_once import by_parts, helped, surpassing, together
 from .blocks import one_sided
 from .by_means import concluded_by_means
 from .conclusion import concluded
+from .deadline import is_over, within
 from .excerpt import confirmed, excerpt
 from .fitting import best_track
 from .grow import first_terms, grow, leaves_much, with_moves
@@ -54,7 +55,11 @@ _LIGHTEST = 0.02  # of the given mass: what fits less of it isn't the force that
 
 @linear_algebra_in_one()
 def diagnose(
-    train: Sequence[Record], validation: Sequence[Record], nominal: Model, progress: Callable[[str], None] | None = None
+    train: Sequence[Record],
+    validation: Sequence[Record],
+    nominal: Model,
+    progress: Callable[[str], None] | None = None,
+    at_most: float | None = None,
 ) -> Diagnosis:
     """What ``nominal`` leaves out of what the recordings show.
 
@@ -63,11 +68,18 @@ def diagnose(
         validation: recordings that nothing is learnt from.
         nominal: model whose physics is in question; its values are a start.
         progress: told what goes on.
+        at_most: time after which no further effects are looked for [s]; None: the search ends by itself.
 
     Raises:
         DiagnosisError: nothing can be compared.
+        InputError: ``at_most`` is no time.
     """
-    tell = progress or (lambda _: None)
+    with within(at_most):
+        return _diagnosed(train, validation, nominal, progress or (lambda _: None))
+
+
+def _diagnosed(train: Sequence[Record], validation: Sequence[Record], nominal: Model, tell: Callable[[str], None]) -> Diagnosis:
+    """As :func:`diagnose`."""
     refuse(train, validation)
     (train, left_out), (validation, left_out_too) = of_use(train), of_use(validation)
     tell("checking the instrument")
@@ -96,6 +108,8 @@ def diagnose(
     growth = _grown_by_all(searched, start, tell)
     if growth.beyond > 0.0 or growth.rest > most_left(growth):
         growth = helped(searched, growth, tell)
+    if is_over():
+        corrected.append("the search was ended after the time that was asked for: further effects may be missing")
     if parts is not None:
         tell("fitting what was found to all samples")
         growth, note = confirmed(parts, growth)

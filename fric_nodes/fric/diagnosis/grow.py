@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from ..model import Model
 from .adding import extended_by_terms, grown_on, settled_again
+from .deadline import is_over
 from .faint import faint_term
 from .fitting import NOTHING, best_track, refit, without_term
 from .growth import AGAIN, FAINTLY, LITTLE, Growth, share_left
@@ -64,7 +65,7 @@ def grow(
     tell = progress or (lambda _: None)
     best = _best_growth(tracks, nominal, tell, begun)
     slower = [track for track in tracks if track.bandwidth < best.track.bandwidth]
-    if best.rest > _MUCH and slower and (best.steps or best.end.excess > NOTHING * best.end.floor):
+    if not is_over() and best.rest > _MUCH and slower and (best.steps or best.end.excess > NOTHING * best.end.floor):
         tell(f"much of it stays unexplained to an observer of {best.track.bandwidth:.3g} rad/s; looking with a slower one")
         other = _best_growth(slower, nominal, tell)
         if other.steps and other.rest < min(best.rest, _HARDLY):
@@ -85,7 +86,7 @@ def grown_faster(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], 
     A slow observer attenuates a force that lasts only briefly far more than one that oscillates, such as that of a ripple.
     """
     for track in sorted(tracks, key=lambda each: -each.bandwidth):
-        if track.bandwidth <= growth.track.bandwidth or not growth.steps:
+        if is_over() or track.bandwidth <= growth.track.bandwidth or not growth.steps:
             break
         begin, end = (refit(track, state.fit.model) for state in (growth.begin, growth.end))
         if begin.excess < CLEARLY * begin.floor:
@@ -107,7 +108,12 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
         tell: told what is done.
     """
     left = growth.end.excess
-    if not growth.steps or left < max(NOTHING * growth.end.floor, LITTLE * growth.begin.excess) or growth.rest > HOPELESS:
+    if (
+        is_over()
+        or not growth.steps
+        or left < max(NOTHING * growth.end.floor, LITTLE * growth.begin.excess)
+        or growth.rest > HOPELESS
+    ):
         return growth
     tell("reconsidering its laws and values")
     state = reconsidered(growth.track, growth.begin, growth.end, tell)
@@ -132,7 +138,8 @@ def _best_growth(
     """The best of the models grown from several first terms, or from a faint one where these explain hardly anything."""
     start, first = begun or first_terms(tracks, nominal, tell)
     best = grown_on(tracks, _compared(tracks, start, first, tell), tell)
-    if not best.steps or (best.rest > _HARDLY and best.begin.excess < FAINTLY * best.begin.floor):
+    faintly = best.rest > _HARDLY and best.begin.excess < FAINTLY * best.begin.floor
+    if not is_over() and (not best.steps or faintly):
         faint = faint_term(tracks, nominal, tell)
         if faint is not None and faint.steps and (not best.steps or faint.rest < best.rest):
             best = faint
@@ -153,7 +160,7 @@ def _compared(tracks: Sequence[Track], start: Growth, first: Growth, tell: Calla
     for other in first.beginnings:
         best, lacks = best_of_all()
         lacks += implausible(best.track.masses, best.end.fit.model)
-        if len(tried) > _OTHER_BEGINNINGS or lacks < (AGAIN if best.ended else _AGAIN_FOR_MORE):
+        if is_over() or len(tried) > _OTHER_BEGINNINGS or lacks < (AGAIN if best.ended else _AGAIN_FOR_MORE):
             break
         if begun & {name.split("#")[0] for name in other.names}:
             continue  # with what it has besides it would come no further than that alone

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 from ..model import Model, Term
 from .candidates import scales_of
+from .deadline import is_over
 from .fitting import NOTHING, State, bounds_of, refit, without_term
 from .other_laws import laws_beside, told
 from .price import implausible
@@ -132,7 +133,7 @@ def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str],
     for _ in range(_MOVES):
         if search.taken(search.without_each(search.state)):
             continue
-        if search.state.excess < NOTHING * search.state.floor:
+        if is_over() or search.state.excess < NOTHING * search.state.floor:
             break
         if not (search.taken(search.elsewhere()) or search.taken(search.other_laws())):
             break

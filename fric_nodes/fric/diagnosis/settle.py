@@ -9,6 +9,7 @@ import numpy as np
 
 from ..model import Model, Term
 from .candidates import Scales, candidates, scales_of
+from .deadline import is_over
 from .fitting import State, bounds_of, free_names, refit, without_term
 from .other_forms import is_stop
 from .price import OF_FLOOR, implausible, price_of
@@ -112,7 +113,7 @@ def settled(track: Track, begin: State, state: State, steps: list[Step]) -> Sett
 
 def exchanged(track: Track, done: Settled) -> Settled:
     """Each term against its rivals with all the others there, where several explain most together."""
-    if len(done.steps) < 2 or done.rest > HOPELESS:
+    if is_over() or len(done.steps) < 2 or done.rest > HOPELESS:
         return done
     state, steps = _exchanged(track, done.begin, done.state, list(done.steps), scales_of(track))
     state, steps, gone = _pruned(track, done.begin, state, steps)

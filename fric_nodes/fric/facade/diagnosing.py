@@ -141,6 +141,7 @@ def diagnose(
     validate: Source | Iterable[Source] = (),
     blocks: int | None = None,
     progress: Progress = silent,
+    at_most: float | None = None,
 ) -> Diagnosed:
     """Find what physics a model leaves out, and show how the fit improves on recordings that nothing was learnt from.
 
@@ -150,6 +151,8 @@ def diagnose(
         validate: recordings held back.
         blocks: instead of ``validate``: cut each recording into so many blocks and hold every other one back.
         progress: told what is going on, a line at a time.
+        at_most: time after which no further effects are looked for [s]; None: the search ends by itself, and comes to the
+            same each time.
 
     Raises:
         InputError: the recordings can't be used; neither or both of ``validate`` and ``blocks`` are given.
@@ -164,4 +167,4 @@ def diagnose(
     require_force(records)
     if blocks is not None:
         records, held_back = in_blocks(records, blocks)
-    return Diagnosed(_diagnose(records, held_back, nominal, progress), tuple(records), tuple(held_back))
+    return Diagnosed(_diagnose(records, held_back, nominal, progress, at_most), tuple(records), tuple(held_back))

@@ -45,6 +45,14 @@ def diagnose(
             help="Instead of --validate: cut each recording into this many blocks and keep every other one for the test.",
         ),
     ] = None,
+    at_most: Annotated[
+        float | None,
+        typer.Option(
+            "--at-most",
+            help="After this time, in s, look for no further effects, and judge what was found. If not given: look until "
+            "nothing more helps.",
+        ),
+    ] = None,
     reading: ReadingGroup = Reading(),
     results: ResultsGroup = Results(Path("diagnosis")),
 ) -> None:
@@ -64,7 +72,7 @@ def diagnose(
     progress(f"reading {len(train) + len(given)} recording(s)")
     with compiled_beside():
         records, kept_apart = (read_all(paths, reading, as_recorded=True) for paths in (train, given))
-        found = fric.diagnose(records, nominal, validate=kept_apart, blocks=blocks, progress=progress)
+        found = fric.diagnose(records, nominal, validate=kept_apart, blocks=blocks, progress=progress, at_most=at_most)
     results.write(_RECORD, found.files())
     if results.as_json:
         typer.echo(json.dumps(found.to_dict()))

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ...model import Model
+from ..deadline import is_over
 from ..fitting import NOTHING, State, added, refit, unseen, without_place
 from ..growth import LITTLE
 from ..settle import CLEARLY
@@ -59,7 +60,7 @@ def grown_together(
     """
     state = state or begin
     for _ in range(_ROUNDS_BESIDE if beside_unknown else _ROUNDS):
-        if state.excess < NOTHING * state.floor:
+        if is_over() or state.excess < NOTHING * state.floor:
             break
         taken = additive(track, state)
         independent = taken.dependence * taken.n_rows
