@@ -279,6 +279,6 @@ def _doubts(seen: _Judged, searched: Sequence[Track], findings: Sequence[Finding
     # How well both shares are known depends on how far what is missing stands out, there and here.
     floor = seen.scored.noise_floor
     there = min(_LEFT_UNSEEN + FLOOR_UNSURE * floor / max(seen.scored.noe_refit - floor, 1e-300), HARDLY)
-    much = rest > most_left(growth) or seen.seen_rest > there
+    much = rest * growth.dearer > most_left(growth) or seen.seen_rest > there
     unknown = seen.missing and (much or doubtful or stand_in or far_off or beside or bool(bent))
     return _Doubts(unknown, far_off, bent, likely, stand_in)

@@ -78,10 +78,14 @@ class Growth:
         return self.rest + self.dear
 
     @property
+    def dearer(self) -> float:
+        """By how much more counts what it leaves, the less it minds the effort; at least 1 (:mod:`.indifference`)."""
+        return dearer(self.track, self.end.fit.model)
+
+    @property
     def dear(self) -> float:
         """The price of its parameters, of what is implausible about it, and of how little it minds the effort."""
-        minded = self.end.left / dearer(self.track, self.end.fit.model)
-        unminded = (self.end.left - minded) / max(self.begin.excess, 1e-300)
+        unminded = (1.0 - 1.0 / self.dearer) * self.end.left / max(self.begin.excess, 1e-300)
         n = sum(not p.shape for held in self.end.fit.model.terms for p in held.effect.parameters)
         return PER_PARAMETER * n + implausible(self.track.masses, self.end.fit.model) + unminded
 

@@ -41,6 +41,9 @@ def indifference(track: Track, model: Model) -> float:
     size, hidden = track.noticeable
     if size <= hidden:
         return 0.0
+    if model.has_slip_dynamics:
+        # Bristles are springs: they mind all of it. But led by its position, a model shows less of what is missing.
+        model = model.with_terms(held for held in model.terms if held.effect.slip is None)
     less, more = mapped(lambda added: track.residual(model, track.with_effort(added)), (-size, size))
     shown = np.clip((less - more) / (2.0 * size), hidden / size, 1.0)
     return float(np.mean(np.where(_moves(track), -np.log(shown), 0.0)))
