@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from ..model import Model
 from ..threads import mapped
+from .runs import SETTLING
 
 if TYPE_CHECKING:
     from .track import Track
@@ -57,8 +57,10 @@ def dearer(track: Track, model: Model) -> float:
 def _moves(track: Track) -> NDArray[np.bool_]:
     """True for the values of a residual at which the axis moves, and has done so for a while; shape ``(n,)``."""
     parts = []
-    for k in range(len(track.runs)):
+    for k, run in enumerate(track.runs):
         velocity = track.motion[k].velocity
         rests = (np.abs(velocity) <= track.rest(k)) | (np.diff(np.sign(velocity), append=0.0) != 0.0)
-        parts.append((~binary_dilation(rests, iterations=track.settled(k))).astype(np.float64))
+        # What an observer shows hangs on what was before, not on what comes.
+        reach = math.ceil(SETTLING / (track.bandwidth * run.sample_time))
+        parts.append((np.convolve(rests, np.ones(reach + 1))[: rests.shape[0]] < 0.5).astype(np.float64))
     return np.asarray(track.joined(parts), dtype=np.bool_)

@@ -87,11 +87,13 @@ def with_play(track: Track, state: State, rivals: list[Rival], found: Screening,
 
 def _as_springs(track: Track, state: State, rival: Rival, found: Screening, scales: Scales) -> list[Rival]:
     """``rival`` with a spring in place of its stops without play; empty where no spring was screened."""
-    offer = next(((each,) for each in (*found.tried, *found.laws) if _is_spring(each.column.term.effect)), None)
+    tried = next((each for each in (*found.tried, *found.laws) if _is_spring(each.column.term.effect)), None)
     stops = [each for each in rival.fit.model.terms if is_stop(each.effect)]
-    if offer is None or len(stops) != 1:
+    if tried is None or len(stops) != 1:
         return []
-    effect = offer[0].column.term.effect
+    # What was offered beside the stops stays beside the spring.
+    offer = tuple(tried if is_stop(each.column.term.effect) else each for each in rival.offer)
+    effect = tried.column.term.effect
     given = stops[0].by_name
     if not {p.name for p in effect.parameters} <= set(given):
         return []

@@ -10,6 +10,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..model import Model
 from .candidates import Scales
 from .fitting import State, bounds_of, free_names, is_driven, shaken, unseen
@@ -72,7 +74,33 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         fitted = side_by_side(track, _fitted_out(track, state, fitted, found, scales), found.unpaid)
     n_shaped = _SHAPED if to_beat > much else 1
     in_shape = [shaped(track, state, rival, found, scales) for rival in fitted[:n_shaped]]
-    return side_by_side(track, [*in_shape, *fitted[n_shaped:]], found.unpaid)
+    ranked = side_by_side(track, [*in_shape, *fitted[n_shaped:]], found.unpaid)
+    return side_by_side(track, _simpler_from_there(track, state, ranked, found, scales), found.unpaid)
+
+
+def _simpler_from_there(track: Track, state: State, ranked: list[Rival], found: Screening, scales: Scales) -> list[Rival]:
+    """``ranked``, where those with fewer parameters than the best are fitted again from what that one has found for the others.
+
+    Beside friction that sticks what the model had before has several minima, too. A simpler law that is left in another one
+    than the best would lose to it by that alone.
+    """
+    result = list(ranked)
+    for k, rival in enumerate(ranked):
+        best = ranked[0].fit.model
+        simpler = len(rival.fit.model.names) < len(best.names) and state.left - rival.left > _ALSO_REFINED * (
+            state.left - ranked[0].left
+        )
+        if not simpler:
+            continue
+        common = {name for name in state.fit.model.names if name in best.names and name in rival.fit.model.names}
+        values = [
+            best.value(n) if n in common else v for n, v in zip(rival.fit.model.names, rival.fit.model.values, strict=True)
+        ]
+        start = rival.fit.model.with_values(np.array(values))
+        other = rival_of(track, state, rival.offer, track.fit(start, rival.fit.names, 8, bounds_of(start, scales)), found)
+        if other.left < rival.left:
+            result[k] = replace(other, dear=rival.dear)
+    return result
 
 
 def _fitted_out(track: Track, state: State, fitted: list[Rival], found: Screening, scales: Scales) -> list[Rival]:
