@@ -165,13 +165,13 @@ def _with_inertia(found: Diagnosis, nominal: Model, train: Sequence[Record]) -> 
     """What was found where hardly any mass fitted the force as it was; with a note, where something unknown hides the inertia.
 
     Raises:
-        DiagnosisError: it is a full explanation, but not of a force that moves the body.
+        DiagnosisError: nothing is missing, or it is fully explained, but of no force that moves the body.
     """
     what = f"the force doesn't hold the inertia of the model's mass {nominal.total_inertia:.3g}"
     do = "where the force is measured at the contact, make its plant 'contact'; else look at unit and sign (fric doctor)"
-    if not found.findings or found.findings[0].effect == "unknown":
+    if found.findings and found.findings[0].effect == "unknown":
         return replace(found, notes=(*found.notes, f"refitted without what is missing, {what}; {do}"))
-    if not _holds_inertia(found, nominal, train):
+    if not found.findings or not _holds_inertia(found, nominal, train):
         raise DiagnosisError(train[0].source, what, do)
     return found
 
