@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import fric
 import numpy as np
 import pytest
 from fric.diagnosis.along import Along
 from fric.diagnosis.candidates import candidates, scales_of
 from fric.diagnosis.fitting import refit, with_room
+from fric.diagnosis.other_forms import with_play
 from fric.diagnosis.other_laws import laws_further, strained, told
 from fric.diagnosis.price import FAR_OFF, implausible, mass_off
 from fric.diagnosis.result import listed
+from fric.diagnosis.rival import rival_of
 from fric.diagnosis.screen import Promise, screen
 from fric.diagnosis.track import Track
 from fric.model import Model, Term, build_model, term
@@ -145,3 +150,30 @@ def test_tails_of_a_place_that_was_not_visited_tell_of_no_other_law() -> None:
     for place, seen in ((0.05, True), (0.3, False)):
         spot = term("position_dependence", "peak", amplitude=0.5, position=place, width=0.02, exponent=1.0)
         assert told(spot, scales) is seen
+
+
+def test_a_spring_in_place_of_closed_stops_keeps_what_was_offered_beside_them() -> None:
+    """Else a term of the model would be told by nobody."""
+    period, nominal = 2e-3, build_model("rigid", {"mass": 5.0}, [term("coulomb", force=8.0), term("viscous", coefficient=30.0)])
+    t = period * np.arange(3000)
+    force = 30.0 * np.sin(2.0 * np.pi * (0.3 + 0.06 * t) * t)
+    ripple = term("ripple", cosine=0.0, sine=2.0, period=0.02)
+    moved = fric.simulate(nominal.with_terms((*nominal.terms, ripple)), force, period=period)
+    noise = np.random.default_rng(2).standard_normal((2, t.shape[0]))
+    record = replace(moved, position=moved.position + 1e-6 * noise[0], effort=moved.effort + 0.05 * noise[1])
+    track = Track.of([record], 140.0, nominal)
+    state, scales = refit(track, nominal), scales_of(track)
+    found = screen(track, state.fit, candidates(state.fit.model, scales), state.chance)
+    beside = next(each for each in found.tried if each.column.term.effect.id == "ripple")
+    closed = term("impact_backlash", gap=1e-12, stiffness=1e6, damping=100.0)
+    spring = term("compliance", stiffness=1e6, damping=100.0)
+    stops, springs = (replace(beside, column=replace(beside.column, term=each)) for each in (closed, spring))
+    found = replace(found, tried=(*found.tried, springs))
+    fit = track.fit(nominal.with_terms((*nominal.terms, closed, ripple)), ["mass"], 1)
+    rival = rival_of(track, state, (stops, beside), fit, found)
+    given = with_play(track, state, [rival], found, scales)
+    assert given
+    for each in given:
+        brought = {held.effect.id for held in each.fit.model.terms} - {held.effect.id for held in nominal.terms}
+        assert sorted(name.split("#")[0] for name in each.names) == sorted(brought)
+    assert ["compliance", "ripple"] in [sorted(each.names) for each in given]
