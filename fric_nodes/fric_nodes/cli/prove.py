@@ -160,7 +160,7 @@ def _inject(recordings: list[Path], model: Path | None, asked: Injections, readi
     wanted = _wanted(asked.sizes, asked.only)
     records = read_all(recordings, reading)
     bare, outcomes = examined(records, read_model(model), wanted, asked.blocks, out, progress, asked.jobs)
-    command = f"fric prove {' '.join(f'--inject {each.name}' for each in recordings)} --model {model.name} --out {out.name}"
+    command = _command(recordings, model, asked, reading, out)
     write_text(out / "injection.html", injection_page(bare, outcomes, command))
     result = {
         "found": sum(each.found for each in outcomes),
@@ -210,3 +210,15 @@ def _wanted(sizes: str, only: str) -> list[Injected]:
             "--only", f"'{', '.join(sorted(names - known))}' can't be injected", f"one of {', '.join(sorted(known))}"
         )
     return [each for each in every if not names or each.effect in names]
+
+
+def _command(recordings: list[Path], model: Path, asked: Injections, reading: Reading, out: Path) -> str:
+    """What makes the page again, with the names of files alone."""
+    words = ["fric prove", *(f"--inject {each.name}" for each in recordings), f"--model {model.name}"]
+    words += [f"--sizes {asked.sizes}", f"--blocks {asked.blocks}", *([f"--only {asked.only}"] if asked.only else [])]
+    words += ["--repair"] if reading.repair else []
+    words += [f"--time {reading.time}"] if reading.time != "stamp" else []
+    given = {"--joint": reading.joint, "--start": reading.start, "--end": reading.end}
+    words += [f"{name} {value}" for name, value in given.items() if value is not None]
+    words += [f"--topic {each}" for each in reading.topic]
+    return " ".join((*words, f"--out {out.name}"))
