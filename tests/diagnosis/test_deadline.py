@@ -21,7 +21,7 @@ NOMINAL = build_model("rigid", {"mass": 5.0}, [term("coulomb", force=8.0), term(
 @pytest.fixture(scope="module")
 def record() -> Record:
     """An axis with two effects that the nominal model lacks."""
-    t = H * np.arange(6000)
+    t = H * np.arange(3000)
     force = 30.0 * np.sin(2.0 * np.pi * (0.3 + 0.06 * t) * t) + 12.0 * np.sin(2.0 * np.pi * 1.7 * t)
     lacks = [term("ripple", cosine=0.0, sine=3.0, period=0.02), term("stiffness", stiffness=60.0, position=0.0)]
     moved = fric.simulate(NOMINAL.with_terms((*NOMINAL.terms, *lacks)), force, period=H)

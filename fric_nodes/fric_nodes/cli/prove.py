@@ -11,13 +11,30 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from fric.errors import InputError
 
-from .groups import grouped
+from .groups import Group, grouped
 from .options import JsonOption, OutOption, Reading, ReadingGroup, progress, read_all
 
 if TYPE_CHECKING:
     from fric.diagnosis.prove.injection import Injected
 
 __all__ = ["register"]
+
+
+@dataclass(frozen=True)
+class Injections:
+    """What is concealed in recordings of one's own, and how it is diagnosed."""
+
+    sizes: Annotated[
+        str, typer.Option("--sizes", help="With --inject: sizes, as multiples of the force that stays unexplained.")
+    ] = "3,6"
+    only: Annotated[str, typer.Option("--only", help="With --inject: effects, separated by commas. If not given: all.")] = ""
+    blocks: Annotated[
+        int, typer.Option("--blocks", help="With --inject: parts of each recording; every other one is kept for the test.")
+    ] = 10
+
+
+InjectionsGroup = Annotated[Injections, Group("Effects concealed in recordings")]
+"""What is concealed, as a parameter of a command."""
 
 
 def register(app: typer.Typer) -> None:
@@ -48,13 +65,7 @@ def prove(
     model: Annotated[
         Path | None, typer.Option("--model", help="With --inject: the model that the diagnosis starts from.")
     ] = None,
-    sizes: Annotated[
-        str, typer.Option("--sizes", help="With --inject: sizes, as multiples of the force that stays unexplained.")
-    ] = "3,6",
-    only: Annotated[str, typer.Option("--only", help="With --inject: effects, separated by commas. If not given: all.")] = "",
-    blocks: Annotated[
-        int, typer.Option("--blocks", help="With --inject: parts of each recording; every other one is kept for the test.")
-    ] = 10,
+    injections: InjectionsGroup = Injections(),
     calibrate: Annotated[
         list[Path] | None,
         typer.Option(
@@ -70,7 +81,7 @@ def prove(
         _calibrate(calibrate, out)
         return
     if inject or model is not None:
-        _inject(inject or [], model, Injections(sizes, only, blocks, jobs), reading, out, as_json)
+        _inject(inject or [], model, injections, jobs, reading, out, as_json)
         return
     _examine(cases, seed, variant, jobs, out, as_json)
 
@@ -136,17 +147,15 @@ def _calibrate(examinations: list[Path], out: Path) -> None:
     typer.echo(f"written: {out / 'calibration.json'}")
 
 
-@dataclass(frozen=True)
-class Injections:
-    """What is concealed in recordings, as it was given: sizes and effects, separated by commas; and how it is diagnosed."""
-
-    sizes: str
-    only: str
-    blocks: int
-    jobs: int | None
-
-
-def _inject(recordings: list[Path], model: Path | None, asked: Injections, reading: Reading, out: Path, as_json: bool) -> None:
+def _inject(
+    recordings: list[Path],
+    model: Path | None,
+    asked: Injections,
+    jobs: int | None,
+    reading: Reading,
+    out: Path,
+    as_json: bool,
+) -> None:
     """Effects concealed in recordings; the page and ``injection.json`` go into ``out``."""
     from fric.diagnosis.prove.injection_exam import examined
     from fric.files import write_text
@@ -159,7 +168,7 @@ def _inject(recordings: list[Path], model: Path | None, asked: Injections, readi
         )
     wanted = _wanted(asked.sizes, asked.only)
     records = read_all(recordings, reading)
-    bare, outcomes = examined(records, read_model(model), wanted, asked.blocks, out, progress, asked.jobs)
+    bare, outcomes = examined(records, read_model(model), wanted, asked.blocks, out, progress, jobs)
     command = _command(recordings, model, asked, reading, out)
     write_text(out / "injection.html", injection_page(bare, outcomes, command))
     result = {
