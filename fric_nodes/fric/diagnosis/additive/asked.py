@@ -38,6 +38,7 @@ class Asked:
     def __init__(self, track: Track, state: State) -> None:
         self._track, self._state = track, state
         self._withouts: dict[int, Fit] = {}
+        self._indifferent: dict[int, float] = {}
 
     @cached_property
     def _functions(self) -> tuple[dict[str, Array], slice]:
@@ -72,4 +73,10 @@ class Asked:
 
     def indifferent(self, place: int) -> float:
         """By how much less the model minds the effort for its term number ``place`` [nats per value], below 0 for more."""
-        return indifference(self._track, self._state.fit.model) - indifference(self._track, self.without(place).model)
+        if place not in self._indifferent:
+            self._indifferent[place] = self._own - indifference(self._track, self.without(place).model)
+        return self._indifferent[place]
+
+    @cached_property
+    def _own(self) -> float:
+        return indifference(self._track, self._state.fit.model)

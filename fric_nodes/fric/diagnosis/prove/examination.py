@@ -67,9 +67,7 @@ def hold(
     """
     began = time.perf_counter()
     orders = plan(n_cases, seed, variant)
-    workers = jobs or os.cpu_count() or 1
-    if workers < 1:
-        raise InputError("--jobs", f"{workers} is too few", "ask for at least one")
+    workers = _workers(jobs)
     entered(entry)  # before anything is drawn
     _claim(out, orders)
     hash_of_key = published(out)
@@ -122,6 +120,13 @@ def _pool(workers: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=alone)
 
 
+def _workers(jobs: int | None) -> int:
+    workers = jobs or os.cpu_count() or 1
+    if workers < 1:
+        raise InputError("--jobs", f"{workers} is too few", "ask for at least one")
+    return workers
+
+
 def in_processes(
     work: Callable[..., Result], tasks: Sequence[tuple[Any, ...]], progress: Progress, what: str, jobs: int | None = None
 ) -> list[Result]:
@@ -130,10 +135,7 @@ def in_processes(
     Raises:
         InputError: less than one.
     """
-    workers = jobs or os.cpu_count() or 1
-    if workers < 1:
-        raise InputError("--jobs", f"{workers} is too few", "ask for at least one")
-    with _pool(workers) as pool:
+    with _pool(_workers(jobs)) as pool:
         return _all(pool, work, tasks, progress, what)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,8 @@ class InjectionOutcome:
         what: was injected.
         rms: root mean square of the added force where it acts [F].
         presence: of the injected effect; 0 where it isn't named.
-        wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor the axis's own.
+        wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor named so in the
+            recordings as they are.
         failure: why there is no diagnosis; empty where there is one.
     """
 
@@ -80,7 +81,7 @@ def examined(
     _claim(out, records, nominal, n_blocks)
     progress("diagnosing the recordings as they are")
     bare = diagnose(*in_blocks(records, n_blocks), nominal)
-    own = tuple(sorted({each.effect for each in bare.findings}))
+    own = {each.effect: each.confidence for each in reversed(bare.findings)}
     rest = bare.force_errors[1] if bare.force_errors is not None else 0.0
     waiting = [what for what in wanted if not _at(out, what).exists()]
     tasks = [(str(_at(out, what)), what, records, nominal, rest, n_blocks, own) for what in waiting]
@@ -89,7 +90,10 @@ def examined(
 
 
 def told_in(out: Path) -> Iterator[dict[str, Any]]:
-    """What each diagnosis in the folder ``out`` said: ``injected``, ``own`` and ``findings``; nothing where it holds none."""
+    """What each diagnosis in the folder ``out`` said: ``injected``, ``own`` and ``findings``; nothing where it holds none.
+
+    ``own`` is how sure each effect was that was named in the recordings as they are.
+    """
     for at in sorted((out / _FOLDER).glob("*.json")):
         yield json.loads(at.read_text(encoding="utf-8"))
 
@@ -112,7 +116,7 @@ def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int) 
 
 
 def _diagnosed(
-    at: str, what: Injected, records: Sequence[Record], nominal: Model, rest: float, n_blocks: int, own: Sequence[str]
+    at: str, what: Injected, records: Sequence[Record], nominal: Model, rest: float, n_blocks: int, own: Mapping[str, float]
 ) -> None:
     """Diagnose ``records`` with ``what`` concealed in them, and write down what was said."""
     changed, rms = injected(records, what, rest)
@@ -122,7 +126,7 @@ def _diagnosed(
         findings = diagnose(*in_blocks(changed, n_blocks), nominal).findings
     except InputError as error:
         failure = str(error)
-    told = {"injected": asdict(what), "rms": rms, "own": list(own), "failure": failure, "findings": [*map(_said, findings)]}
+    told = {"injected": asdict(what), "rms": rms, "own": dict(own), "failure": failure, "findings": [*map(_said, findings)]}
     Path(at).parent.mkdir(parents=True, exist_ok=True)
     write_text(Path(at), json.dumps(told, indent=1))
 
@@ -136,8 +140,7 @@ def _said(finding: Finding) -> dict[str, Any]:
 
 def _outcome(told: dict[str, Any]) -> InjectionOutcome:
     what = Injected(**told["injected"])
-    sure: dict[str, float] = {}
-    for each in told["findings"]:
-        sure[each["effect"]] = max(each["confidence"], sure.get(each["effect"], 0.0))
-    wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in {what.effect, "unknown", *told["own"]})
+    sure = {each["effect"]: each["confidence"] for each in reversed(told["findings"])}
+    own = {effect for effect, confidence in told["own"].items() if confidence >= AS_LIKELY}
+    wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in {what.effect, "unknown", *own})
     return InjectionOutcome(what, told["rms"], sure.get(what.effect, 0.0), tuple(sorted(wrong)), told["failure"])
