@@ -14,7 +14,7 @@ from fric.diagnosis.fitting import refit
 from fric.diagnosis.locate import Where
 from fric.diagnosis.presence import Half, Presence, presences
 from fric.diagnosis.result import Estimate, Finding
-from fric.diagnosis.settle import Step
+from fric.diagnosis.settle import Step, renamed
 from fric.diagnosis.start import started
 from fric.diagnosis.track import Track
 from fric.model import Model, build_model, term
@@ -84,11 +84,28 @@ def test_what_flexible_functions_explain_as_well_is_not_asked_for(fitted: Fitted
     assert nats["quadratic_drag"] < 3.0
 
 
+NOWHERE = Where((((0.0, 1.0),),), 1.0, "", "speed", (0.0, 1.0), 1.0)
+
+
+def told(name: str, error: float) -> Finding:
+    values = {f"{name}.cosine": Estimate(2.0, error, "N")}
+    return Finding("ripple", "", "ripple", 0.9, None, NOWHERE, "load", 0.9, "", values, 2.0, 0.1, term=name)
+
+
 @pytest.mark.parametrize(("error", "most"), [(0.1, 1.0), (3.0, 0.45)])
 def test_what_is_smaller_than_its_own_standard_error_is_not_told_as_likely(error: float, most: float) -> None:
-    step = Step("ripple", 1.0, 0.1, 0.0, 1.0, (), ())
-    nowhere = Where((((0.0, 1.0),),), 1.0, "", "speed", (0.0, 1.0), 1.0)
-    values = {"ripple.cosine": Estimate(2.0, error, "N")}
-    told = Finding("ripple", "", "ripple", 0.9, None, nowhere, "load", 0.9, "", values, 2.0, 0.1)
     sure = Presence(0.97, (Half(9.0, {}), Half(9.0, {})), Evidence(0.9, 0.0, 9.0))
-    assert with_presences({"ripple": sure}, [told], [step])[0].confidence == min(0.97, most)
+    assert with_presences({"ripple": sure}, [told("ripple", error)])[0].confidence == min(0.97, most)
+
+
+def test_two_of_one_effect_are_each_as_sure_as_their_own_evidence() -> None:
+    sure, unsure = (Presence(p, (Half(9.0, {}), Half(9.0, {})), Evidence(0.9, 0.0, 9.0)) for p in (0.97, 0.2))
+    held = with_presences({"ripple": sure, "ripple#2": unsure}, [told("ripple", 0.1), told("ripple#2", 0.1)])
+    assert [each.confidence for each in held] == [0.97, 0.2]
+
+
+def test_a_term_that_goes_gives_its_name_to_the_next_of_its_effect() -> None:
+    both = NOMINAL.with_terms((*NOMINAL.terms, term("ripple", **RIPPLE), term("ripple", **{**RIPPLE, "period": 0.03})))
+    second, friction = (Step(name, 1.0, 0.1, 0.0, 1.0, (), ()) for name in ("ripple#2", "coulomb"))
+    assert renamed(second, both, both.prefixes.index("ripple")).term == "ripple"
+    assert renamed(friction, both, both.prefixes.index("ripple")).term == "coulomb"

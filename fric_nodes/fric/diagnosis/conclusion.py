@@ -25,6 +25,7 @@ from .findings import (
 )
 from .growth import Growth, without_nothings
 from .held_back import OnlyThere, only_there
+from .indifference import dearer
 from .judging import (
     FLOOR_UNSURE,
     HARDLY,
@@ -218,11 +219,10 @@ def _rest(
 
 def _surely(seen: _Judged, unexplained: Unexplained, unknown: Finding | None, findings: list[Finding]) -> list[Finding]:
     """``findings`` with how sure each is there, whatever stays unexplained; behind what is ``unknown``, if anything is."""
-    shares = {each.effect: each.share for each in findings}
+    shares = {each.term: each.share for each in findings}
     steps = seen.growth.steps
-    of_steps = {step.term: shares[step.term.split("#")[0]] for step in steps}
-    present = presences(seen.track, seen.end, steps, of_steps, min(unexplained.share, 1.0), unknown is None)
-    told = with_presences(present, findings, steps)
+    present = presences(seen.track, seen.end, steps, shares, min(unexplained.share, 1.0), unknown is None)
+    told = with_presences(present, findings)
     # Beside something unknown, what takes most off comes first.
     return told if unknown is None else [unknown, *sorted(told, key=lambda each: -each.share)]
 
@@ -254,7 +254,8 @@ def _judged(validation: Sequence[Record], whole: Sequence[Track], nominal: Model
         scored = replace(scored, noe_augmented=noe["refit"])
     # Floors of few twins are known to a tenth or two of themselves, no better.
     sure = noise_floor * FLOOR_KNOWN + 200.0 * float(np.std([each @ each for each in floor])) / spread
-    seen_rest = max(scored.noe_augmented - noise_floor - sure, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
+    minded = dearer(held, end) * scored.noe_augmented
+    seen_rest = max(minded - noise_floor - sure, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
     seen_rest *= held.unpaid(begin.model) if end.has_slip_dynamics else 1.0
     return _Judged(growth, held, track, begin, end, left, floor, scored, told, learnt, missing, seen_rest)
 
@@ -271,14 +272,14 @@ def _doubts(seen: _Judged, searched: Sequence[Track], findings: Sequence[Finding
     beside = growth.beyond > 0.0 or plain is not growth
     # A law that has run to the end of its form stands in for another.
     bent = [term for term in (end.terms[list(end.prefixes).index(step.term)] for step in growth.steps) if strained(term)]
-    if seen.missing and (rest > LITTLE_LEFT or doubtful or far_off or beside or bent or len(growth.steps) >= MANY):
+    # How well both shares are known depends on how far what is missing stands out, there and here.
+    floor = seen.scored.noise_floor
+    there = min(_LEFT_UNSEEN + FLOOR_UNSURE * floor / max(seen.scored.noe_refit - floor, 1e-300), HARDLY)
+    much = rest > most_left(growth) or seen.seen_rest > there
+    reserved = much or doubtful or far_off or beside or bool(bent)
+    if seen.missing and (reserved or rest > LITTLE_LEFT or len(growth.steps) >= MANY):
         likely, of_all = signature_of(searched, plain, max(rest, plain.rest), [each.share for each in findings])
         # Where one signature explains more than several effects do together, these have only stood in for it: a force that
         # swings at one frequency goes with the motion it makes there as a delay, a mode and bristles might.
         stand_in = of_all and len(findings) > 1
-    # How well both shares are known depends on how far what is missing stands out, there and here.
-    floor = seen.scored.noise_floor
-    there = min(_LEFT_UNSEEN + FLOOR_UNSURE * floor / max(seen.scored.noe_refit - floor, 1e-300), HARDLY)
-    much = rest * growth.dearer > most_left(growth) or seen.seen_rest > there
-    unknown = seen.missing and (much or doubtful or stand_in or far_off or beside or bool(bent))
-    return _Doubts(unknown, far_off, bent, likely, stand_in)
+    return _Doubts(seen.missing and (reserved or stand_in), far_off, bent, likely, stand_in)

@@ -51,12 +51,11 @@ _STANDS_OUT = 3.0  # times the floor: with less, noise is more than a quarter of
 _UNDECIDED = 0.45  # confidence at most, where no parameter of an effect is as large as its own standard error
 
 
-def with_presences(present: Mapping[str, Presence], findings: Sequence[Finding], steps: Sequence[Step]) -> list[Finding]:
-    """``findings``, each as sure as what speaks for it makes it (:mod:`.presence`)."""
-    by_effect = {step.term.split("#")[0]: present[step.term] for step in steps}
+def with_presences(present: Mapping[str, Presence], findings: Sequence[Finding]) -> list[Finding]:
+    """``findings``, each as sure as what speaks for its term makes it (:mod:`.presence`)."""
     held = []
     for each in findings:
-        found = by_effect[each.effect]
+        found = present[each.term]
         sure = min(found.probability, _UNDECIDED) if _undecided(each.parameters) else found.probability
         runner = each.runner_up
         if runner is not None:
@@ -143,6 +142,7 @@ def finding_of(
         parameters=parameters,
         noe_before=scored.noe_refit,
         noe_after=scored.noe_augmented,
+        term=step.term,
     )
 
 

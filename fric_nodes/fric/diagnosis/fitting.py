@@ -65,7 +65,8 @@ class State:
     Attributes:
         fit: to all blocks.
         left: sum of squares on unseen blocks [F^2], the more where the model minds the effort less.
-        floor: the same on twins of the model, their mean [F^2]; as much more.
+        floor: the same on twins of the model, their mean [F^2]; no more for that: it is what noise leaves, which tells nothing
+            of physics.
         chance: residuals of the twins, shape ``(n,)`` each [F].
     """
 
@@ -96,8 +97,7 @@ def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
     made = twins(track, fit.model, _TWINS)
     chance = tuple(track.residual(fit.model, twin) for twin in made)
     floor = float(np.mean([unseen(track, fit, each) for each in chance]))
-    more = dearer(track, fit.model)
-    return State(fit, more * unseen(track, fit, fit.residual), more * floor, chance)
+    return State(fit, left_by(track, fit), floor, chance)
 
 
 def left_by(track: Track, fit: Fit) -> float:

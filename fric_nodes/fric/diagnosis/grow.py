@@ -15,7 +15,7 @@ from ..model import Model
 from .adding import extended_by_terms, grown_on, settled_again
 from .deadline import is_over
 from .faint import faint_term
-from .fitting import NOTHING, best_track, refit, without_term
+from .fitting import NOTHING, added, best_track, refit, without_place
 from .growth import AGAIN, FAINTLY, LITTLE, Growth, share_left
 from .moves import reconsidered
 from .price import implausible
@@ -120,14 +120,15 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
     if state is growth.end:
         return growth
     model = state.fit.model
-    there = {held.effect.id: prefix for prefix, held in zip(model.prefixes, model.terms, strict=True)}
+    brought = added(growth.begin.fit.model, model)
     steps = []
     for step in growth.steps:
-        name = there.get(step.term.split("#")[0])
-        if name is not None:
-            without = refit(growth.track, without_term(model, name.split("#")[0]), max_iterations=8)
+        place = next((k for k in brought if model.terms[k].effect.id == step.term.split("#")[0]), None)
+        if place is not None:
+            brought.remove(place)
+            without = refit(growth.track, without_place(model, place), max_iterations=8)
             beside = without.left, state.left, without.floor, without.excess
-            steps.append(Step(name, *beside, step.rivals, step.screened, step.price))
+            steps.append(Step(model.prefixes[place], *beside, step.rivals, step.screened, step.price))
     more = settled_again(replace(growth, end=state, steps=tuple(steps)))
     return more if more.steps and more.price < growth.price else growth
 

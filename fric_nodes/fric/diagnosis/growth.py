@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from ..model import Model
 from .candidates import candidates, scales_of
 from .fitting import State, refit
-from .indifference import dearer
 from .price import PER_PARAMETER, implausible
 from .rival import Rival
 from .screen import Tried, screen
@@ -78,16 +77,10 @@ class Growth:
         return self.rest + self.dear
 
     @property
-    def dearer(self) -> float:
-        """By how much more counts what it leaves, the less it minds the effort; at least 1 (:mod:`.indifference`)."""
-        return dearer(self.track, self.end.fit.model)
-
-    @property
     def dear(self) -> float:
-        """The price of its parameters, of what is implausible about it, and of how little it minds the effort."""
-        unminded = (1.0 - 1.0 / self.dearer) * self.end.left / max(self.begin.excess, 1e-300)
+        """The price of its parameters, and of what is implausible about it."""
         n = sum(not p.shape for held in self.end.fit.model.terms for p in held.effect.parameters)
-        return PER_PARAMETER * n + implausible(self.track.masses, self.end.fit.model) + unminded
+        return PER_PARAMETER * n + implausible(self.track.masses, self.end.fit.model)
 
 
 def share_left(growth: Growth) -> float:

@@ -110,7 +110,7 @@ def shown(validation: Sequence[Record], track: Track, begin: Model, as_track: bo
     step = max(record.sample_time for record in validation)
     tried = (track.bandwidth,) if as_track else (*BANDWIDTHS, track.bandwidth)
     for bandwidth in sorted({min(w, FAST / step) for w in tried}, reverse=True):
-        held = replace(Track.of(validation, bandwidth, begin, track.late), mass=track.mass)
+        held = replace(Track.of(validation, bandwidth, begin, track.late), mass=track.mass, noticeable=track.noticeable)
         if not held.runs:
             raise DiagnosisError(validation[0].source, "has no valid part of 200 samples", "record for longer")
         left = held.residual(begin)

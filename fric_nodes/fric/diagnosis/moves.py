@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from ..model import Model, Term
 from .candidates import scales_of
 from .deadline import is_over
-from .fitting import NOTHING, State, bounds_of, refit, without_term
+from .fitting import NOTHING, State, bounds_of, refit, without_place
 from .other_laws import laws_beside, told
 from .price import implausible
 from .settle import TO_STAY
@@ -73,7 +73,7 @@ class _Search:
         """``state`` with each brought term taken away but that at the place ``but``, everything else fitted anew."""
         model = state.fit.model
         return [
-            (f"without {model.terms[k].effect.title}", refit(self.track, without_term(model, model.terms[k].effect.id)))
+            (f"without {model.terms[k].effect.title}", refit(self.track, without_place(model, k)))
             for k in self.brought
             if k != but
         ]

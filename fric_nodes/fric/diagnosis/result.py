@@ -65,6 +65,7 @@ class Finding:
         noe_after: NOE of the grown model on them [%].
         reproduced: what each half of the recordings says of it by itself; empty where that wasn't asked.
         weighed: what speaks for it; None of something unknown.
+        term: name of its term in the grown model, which tells two of one effect apart; empty where it has none.
     """
 
     effect: str
@@ -81,6 +82,7 @@ class Finding:
     noe_after: float
     reproduced: tuple[Half, ...] = ()
     weighed: Evidence | None = None
+    term: str = ""
 
 
 @dataclass(frozen=True)

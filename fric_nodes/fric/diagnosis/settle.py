@@ -10,7 +10,8 @@ import numpy as np
 from ..model import Model, Term
 from .candidates import Scales, candidates, scales_of
 from .deadline import is_over
-from .fitting import State, bounds_of, free_names, refit, without_term
+from .fitting import State, bounds_of, free_names, refit, without_place
+from .indifference import dearer
 from .other_forms import is_stop
 from .price import OF_FLOOR, implausible, price_of
 from .rival import Rival, name_of
@@ -32,6 +33,7 @@ __all__ = [
     "exchanged",
     "is_nothing",
     "merged",
+    "renamed",
     "settled",
 ]
 
@@ -166,7 +168,8 @@ def audit(track: Track, begin: Model, end: Model) -> float:
     """Share of what ``begin`` lacks that ``end`` lacks too, both fitted to one half of the recordings and judged on the other.
 
     Half of the recordings may tell a parameter badly, such as the period of a ripple; what that costs is no physics left out,
-    and is found on twins, which are treated alike. Above 1 the grown model is the worse one.
+    and is found on twins, which are treated alike. What ``end`` leaves counts the more, the less it minds the effort
+    (:mod:`.indifference`). Above 1 the grown model is the worse one.
     """
     made = twins(track, end, _TWINS)
     floor = float(np.mean([float(np.sum(track.residual(end, twin) ** 2)) for twin in made]))
@@ -176,7 +179,7 @@ def audit(track: Track, begin: Model, end: Model) -> float:
     if left - floor > _AUDITED * missing:
         of_twins = float(np.mean([_on_other_half(track, end, twin) for twin in made]))
         left -= max(of_twins - floor, 0.0)
-    return unpaid * max(left - (1.0 + FLOOR_KNOWN) * floor, 0.0) / missing
+    return unpaid * max(dearer(track, end) * left - (1.0 + FLOOR_KNOWN) * floor, 0.0) / missing
 
 
 def _on_other_half(track: Track, model: Model, twin: Twin | None = None) -> float:
@@ -213,8 +216,8 @@ def _takes_its_place(track: Track, begin: State, without: State, state: State, o
     """
     if without.left - rival.left < _COMPARABLE * (without.left - state.left):
         return False
-    dearer = implausible(track.masses, rival.fit.model) - implausible(track.masses, state.fit.model)
-    more = max(dearer, 0.0) * max(begin.excess - without.excess, 0.0)
+    stranger = implausible(track.masses, rival.fit.model) - implausible(track.masses, state.fit.model)
+    more = max(stranger, 0.0) * max(begin.excess - without.excess, 0.0)
     # Twins that stick and slip each in its own way leave more than a recording does: no floor is higher than what is left.
     floor = min(state.floor, state.left, rival.left)
     return own - rival.score - more > max(OF_FLOOR * floor, TO_STAY * without.excess)
@@ -222,12 +225,13 @@ def _takes_its_place(track: Track, begin: State, without: State, state: State, o
 
 def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scales: Scales) -> tuple[State, list[Step]]:
     """Each term against its rivals with all the others there: what came first was chosen while the others were missing."""
-    for k, step in enumerate(list(steps)):
-        effect_id = step.term.split("#")[0]
-        terms = [held for held in state.fit.model.terms if held.effect.id != effect_id]
-        if len(terms) != len(state.fit.model.terms) - 1:
+    for k in range(len(steps)):
+        step, model = steps[k], state.fit.model
+        if step.term not in model.prefixes:
             continue
-        without = refit(track, without_term(state.fit.model, effect_id), max_iterations=8)
+        place = model.prefixes.index(step.term)
+        effect_id = model.terms[place].effect.id
+        without = refit(track, without_place(model, place), max_iterations=8)
         found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance, in_pairs=False)
         rivals = [rival for rival in rivals_of(track, without, found, scales, state.left) if rival.effect.id != effect_id]
         own = state.left + _price(track, state.fit.model, step.term, without.excess)
@@ -237,10 +241,18 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
             # What leaves something is not the simpler explanation beside one that leaves nothing.
             if state.excess > OF_FLOOR * state.floor or other.left - state.left < OF_FLOOR * state.floor:
                 state, term, rivals = other, rivals[0].names[0], rivals[1:]
+                steps[:] = [each if each is step else renamed(each, model, place) for each in steps]
         price = _price(track, state.fit.model, term, without.excess)
         beside = without.left, state.left, without.floor, without.excess
         steps[k] = Step(term, *beside, tuple(rivals), found.tried, price)
     return state, steps
+
+
+def renamed(step: Step, model: Model, place: int) -> Step:
+    """``step`` by the name that its term has where the term number ``place`` of ``model`` is gone."""
+    others = (name for k, name in enumerate(model.prefixes) if k != place)
+    now = dict(zip(others, without_place(model, place).prefixes, strict=True))
+    return replace(step, term=now.get(step.term, step.term))
 
 
 def is_nothing(held: Term) -> bool:
@@ -260,16 +272,16 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
     gone: list[tuple[str, str]] = []
     while len(steps) > 1:
         left_out: list[tuple[float, State, Step, str]] = []
+        model = state.fit.model
         for step in steps:
-            effect_id = step.term.split("#")[0]
-            terms = [held for held in state.fit.model.terms if held.effect.id != effect_id]
-            if len(terms) != len(state.fit.model.terms) - 1:
+            if step.term not in model.prefixes:
                 continue
-            without = refit(track, without_term(state.fit.model, effect_id), max_iterations=8)
-            nothing = is_nothing(next(each for each in state.fit.model.terms if each.effect.id == effect_id))
+            place = model.prefixes.index(step.term)
+            without = refit(track, without_place(model, place), max_iterations=8)
+            nothing = is_nothing(model.terms[place])
             # What leaves an axis of another mass behind has only changed what stands in for what.
-            dearer = implausible(track.masses, without.fit.model) - implausible(track.masses, state.fit.model)
-            lost = without.left - state.left + begin.excess * max(dearer, 0.0)
+            stranger = implausible(track.masses, without.fit.model) - implausible(track.masses, state.fit.model)
+            lost = without.left - state.left + begin.excess * max(stranger, 0.0)
             alone = lost > NEARLY_ALL * without.excess and without.excess > CLEARLY * without.floor
             little = OF_FLOOR * state.floor if alone else max(OF_FLOOR * state.floor, TO_STAY * begin.excess)
             if nothing or lost < little:
@@ -278,6 +290,7 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
         if not left_out:
             break
         _, state, least, why = min(left_out, key=lambda each: each[0])
-        steps = [each for each in steps if each is not least]
+        place = model.prefixes.index(least.term)
+        steps = [renamed(each, model, place) for each in steps if each is not least]
         gone.append((least.term.split("#")[0], why))
     return state, steps, gone
