@@ -11,10 +11,13 @@ from fric.diagnosis.additive.asked import Asked
 from fric.diagnosis.calibration import Evidence
 from fric.diagnosis.findings import with_presences
 from fric.diagnosis.fitting import refit
+from fric.diagnosis.growth import Growth
+from fric.diagnosis.halves import Half
 from fric.diagnosis.locate import Where
-from fric.diagnosis.presence import Half, Presence, presences
+from fric.diagnosis.presence import Presence, presences
+from fric.diagnosis.reproduced import reproduced
 from fric.diagnosis.result import Estimate, Finding
-from fric.diagnosis.settle import Step, renamed
+from fric.diagnosis.settle import Step, audit, renamed
 from fric.diagnosis.start import started
 from fric.diagnosis.track import Track
 from fric.model import Model, build_model, term
@@ -74,6 +77,23 @@ def test_what_stays_unexplained_never_makes_surer(found: dict[str, Presence], fi
 
 def test_what_only_mends_something_unknown_is_not_sure(found: dict[str, Presence]) -> None:
     assert found["quadratic_drag"].probability < min(0.3, 0.2 * found["ripple"].probability)
+
+
+def test_what_halves_contradict_each_other_about_goes(fitted: Fitted) -> None:
+    track, model, steps = fitted
+    ripple = next(held for held in model.terms if held.effect.id == "ripple")
+    spring = term("stiffness", stiffness=5.0, position=0.0)  # what wanders over time goes with the position for a while
+    begin = refit(track, model.with_terms(held for held in model.terms if held.effect.id in ("coulomb", "viscous")))
+    end = refit(track, begin.fit.model.with_terms((*begin.fit.model.terms, ripple, spring)))
+    both = tuple(replace(steps[0], term=name) for name in ("stiffness", "ripple"))
+    growth = Growth(track, begin, end, both, (), audit(track, begin.fit.model, end.fit.model))
+    said: list[str] = []
+    fewer = reproduced(growth, said.append)
+    assert [step.term for step in fewer.steps] == ["ripple"]
+    assert [name for name, _ in fewer.rejected] == ["stiffness"]
+    assert "stiffness" not in fewer.end.fit.model.prefixes
+    assert len(said) == 1
+    assert fewer.price < growth.price
 
 
 def test_what_flexible_functions_explain_as_well_is_not_asked_for(fitted: Fitted) -> None:

@@ -33,6 +33,7 @@ from .intake import of_use, refuse, without_faults
 from .judging import most_left
 from .ladder import ladder_of
 from .price import FAR_OFF, implausible
+from .reproduced import reproduced
 from .result import Diagnosis
 from .start import (
     DiagnosisError,
@@ -105,7 +106,7 @@ def _diagnosed(train: Sequence[Record], validation: Sequence[Record], nominal: M
         tracks, start = started(nominal, train, as_given=True)
     parts = excerpt(tracks, start)
     searched = list(tracks if parts is None else parts.tracks)
-    growth = _grown_by_all(searched, start, tell)
+    growth = reproduced(_grown_by_all(searched, start, tell), tell)
     if growth.beyond > 0.0 or growth.rest > most_left(growth):
         growth = helped(searched, growth, tell)
     if is_over():

@@ -15,9 +15,9 @@ from ..record import Array
 from .additive.told import ComponentFinding
 from .calibration import Evidence
 from .confidence import AS_LIKELY, FAINT
+from .halves import Half
 from .limits import Limit
 from .locate import Where
-from .presence import Half
 
 __all__ = [
     "Diagnosis", "Estimate", "Finding", "Grown", "NominalPart", "Prediction", "Rejected", "RunnerUp", "Unexplained",

@@ -47,7 +47,8 @@ def _bump(s: Motion) -> Array:
 
 
 INJECTED: dict[str, Callable[[Motion], Array]] = {
-    "asymmetry": lambda s: np.abs(s.sign),
+    # Another Coulomb level forward than backward is a constant force while the axis moves, which nominal models have.
+    "asymmetry": lambda s: np.abs(s.velocity) / s.fast,
     "stribeck": lambda s: np.exp(-np.abs(s.velocity) / (0.05 * s.fast)) * s.sign,
     "quadratic_drag": lambda s: s.velocity * np.abs(s.velocity) / s.fast**2,
     "ripple": lambda s: np.sin(2.0 * np.pi * s.position / (0.037 * (s.high - s.low))),
