@@ -16,6 +16,7 @@ from .fitting import NOTHING, State, best_track, refit
 from .growth import LITTLE, Growth, screened
 from .laws import with_best_laws
 from .price import OF_EXCESS, earns, worth
+from .reproduced import reproduced
 from .rival import Rival
 from .rivals import rivals_of
 from .screen import Tried, screen
@@ -152,7 +153,8 @@ def settled_again(growth: Growth) -> Growth:
     done = settled(growth.track, growth.begin, growth.end, list(growth.steps))
     gone = (*growth.rejected, *done.gone)
     held = replace(growth, begin=done.begin, end=done.state, steps=done.steps, rest=done.rest, rejected=gone)
-    return _exchanged(held)
+    # What halves contradict each other about goes first: none of its rivals has to be fitted then.
+    return _exchanged(reproduced(held))
 
 
 def _exchanged(growth: Growth) -> Growth:

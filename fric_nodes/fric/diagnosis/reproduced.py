@@ -21,7 +21,7 @@ __all__ = ["reproduced"]
 _WHY = "one half of the recordings does not find it again in the other"
 
 
-def reproduced(growth: Growth, tell: Callable[[str], None]) -> Growth:
+def reproduced(growth: Growth, tell: Callable[[str], None] = lambda _: None) -> Growth:
     """``growth`` without the terms that its halves contradict each other about.
 
     Args:
