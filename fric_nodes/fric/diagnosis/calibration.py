@@ -19,6 +19,7 @@ __all__ = ["FORMAT", "Calibration", "Evidence", "calibration", "measures_of"]
 
 FORMAT = "fric-calibration/1"
 _LEAST = 1e-3  # numerical: of a share, whose logarithm is taken
+_PLENTY = 1e4  # numerical, nats: of evidence, beyond which nothing is surer
 _MARGIN = 7.0  # numerical: a rival that leaves a thousand times more is out
 _SURE = 12.0  # numerical: logarithm of odds, beyond which nothing is surer
 
@@ -50,19 +51,24 @@ class Evidence:
 def measures_of(evidence: Evidence) -> dict[str, float]:
     """The measures that enter the odds, by name; each counts for the effect, the more the larger it is.
 
-    Of halves and functions the one that says less counts: an effect has to be asked for by both.
+    What stays unexplained is held against the effect's own part: a large effect is no less there for what others leave, and a
+    small one no more for what a large one explains. Halves or functions that speak against an effect count against it.
     """
-    share = math.log(min(max(evidence.share, _LEAST), 1.0))
-    rest = min(max(evidence.rest, _LEAST), 1.0)
+    share = min(max(evidence.share, _LEAST), 1.0)
     return {
-        "share": share,
-        "explained": math.log(max(1.0 - rest, _LEAST)),
-        "share over rest": share - math.log(rest),
-        "weakest": math.log1p(max(min(evidence.halves, evidence.functions), 0.0)),
+        "share": math.log(share),
+        "share over rest": math.log(share / min(max(evidence.rest, _LEAST * share), 1.0)),
+        "halves": _signed(evidence.halves),
+        "functions": _signed(evidence.functions),
         "rivals": math.log(min(max(evidence.rivals, _LEAST), 1.0)),
         "margin": min(max(evidence.margin, 0.0), _MARGIN),
         "complete": float(evidence.complete),
     }
+
+
+def _signed(nats: float) -> float:
+    """The order of magnitude of evidence, with its sign."""
+    return math.copysign(math.log1p(min(abs(nats), _PLENTY)), nats)
 
 
 @dataclass(frozen=True)
