@@ -25,6 +25,12 @@ def fric(*arguments: object, monkeypatch: pytest.MonkeyPatch) -> tuple[int, str,
 
 
 Command = Callable[..., tuple[int, str, str]]
+_WITHOUT_FRICTION = """format: fric-model/1
+joint: axis
+units: {position: m, force: N}
+plant: {type: rigid, mass: 5.0}
+terms: [{effect: viscous, coefficient: 30.0}]
+"""
 
 
 @pytest.fixture
@@ -76,6 +82,22 @@ def test_doctor_and_a_mapping(tmp_path: Path, command: Command) -> None:
     (row,) = pq.read_table(tmp_path / "o" / "results.parquet").to_pylist()
     assert (row["joint"], row["axis"], row["time"], row["status"]) == ("z", "z", None, "ok")
     assert {each["check"] for each in row["checks"]} > {"stamps"}
+
+
+def test_a_search_that_is_ended_is_told_and_another_bound_is_another_job(good: Path, tmp_path: Path, command: Command) -> None:
+    (tmp_path / "model.yaml").write_text(_WITHOUT_FRICTION)
+    run = ("diagnose", good / "machine_2" / "day_0", "--model", tmp_path / "model.yaml", "--workers", 0, "--reports", 0)
+    out = ("--out", tmp_path / "out", "--at-most")
+    for seconds, worked in ((1e-3, "1 worked on now"), (1e-3, "none to work on"), (2e-3, "1 worked on now")):
+        status, printed, error = command(*run, *out, seconds)
+        assert status == 0, error
+        assert worked in printed
+        (row,) = pq.read_table(tmp_path / "out" / "results.parquet").to_pylist()
+        assert any("the search was ended after the time that was asked for" in note for note in row["notes"])
+        assert row["mismatch"]
+    status, _, error = command(*run, *out, 0)
+    assert status == 2
+    assert "--at-most: 0 s is no time" in error
 
 
 @pytest.mark.parametrize(

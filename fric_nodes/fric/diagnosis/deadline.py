@@ -14,9 +14,19 @@ from contextvars import ContextVar
 
 from ..errors import InputError
 
-__all__ = ["is_over", "within"]
+__all__ = ["is_over", "refuse_no_time", "within"]
 
 _ends: ContextVar[float] = ContextVar("ends", default=math.inf)
+
+
+def refuse_no_time(seconds: float | None) -> None:
+    """Refuse what no search can end after; None is no bound.
+
+    Raises:
+        InputError: no time at all.
+    """
+    if seconds is not None and not seconds > 0.0:
+        raise InputError("--at-most", f"{seconds:g} s is no time", "give the seconds that the search may take, such as 60")
 
 
 @contextmanager
@@ -26,8 +36,7 @@ def within(seconds: float | None) -> Iterator[None]:
     Raises:
         InputError: no time at all.
     """
-    if seconds is not None and not seconds > 0.0:
-        raise InputError("--at-most", f"{seconds:g} s is no time", "give the seconds that the search may take, such as 60")
+    refuse_no_time(seconds)
     before = _ends.set(math.inf if seconds is None else time.monotonic() + seconds)
     try:
         yield

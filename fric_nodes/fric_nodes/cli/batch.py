@@ -111,6 +111,14 @@ def diagnose(
     blocks: Annotated[
         int, typer.Option("--blocks", help="Blocks that each recording is cut into; every other one is kept for the test.")
     ] = 6,
+    at_most: Annotated[
+        float | None,
+        typer.Option(
+            "--at-most",
+            help="Per recording: after this time, in s, look for no further effects, and judge what was found. If not given: "
+            "look until nothing more helps.",
+        ),
+    ] = None,
     recordings: RecordingsGroup = _Recordings(),
     workers: WorkersGroup = _Workers(),
     results: ResultsGroup = Results(Path("fleet")),
@@ -119,7 +127,12 @@ def diagnose(
 
     Exit status 1 when some recordings were refused.
     """
-    _batch("diagnose", patterns, _model_text(model, ""), {"blocks": blocks}, recordings, workers, results)
+    from fric.diagnosis.deadline import refuse_no_time
+
+    refuse_no_time(at_most)
+    # Another bound is another job: a search that was ended early is no result of one that was not.
+    settings = {"blocks": blocks} if at_most is None else {"blocks": blocks, "at_most": at_most}
+    _batch("diagnose", patterns, _model_text(model, ""), settings, recordings, workers, results)
 
 
 @grouped

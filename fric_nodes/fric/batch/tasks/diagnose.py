@@ -17,7 +17,7 @@ __all__ = ["TASK"]
 
 
 def _found(record: Record, model: Model, settings: Mapping[str, Any]) -> Diagnosed:
-    return diagnose(record, model, blocks=int(settings.get("blocks", 6)))
+    return diagnose(record, model, blocks=int(settings.get("blocks", 6)), at_most=settings.get("at_most"))
 
 
 def _run(record: Record, model: Model | None, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -43,6 +43,7 @@ def _run(record: Record, model: Model | None, settings: Mapping[str, Any]) -> di
         "parameters": estimates(found.refit),
         "mismatch": bool(found.mismatch),
         "verdict": found.sentence,
+        "notes": list(found.notes),
         "causes": causes,
         "completeness": number(1.0 - found.unexplained.share),
         "limits": limits,
@@ -57,6 +58,7 @@ TASK = Task(
     lambda: {
         "mismatch": pa.bool_(),
         "verdict": pa.string(),
+        "notes": pa.list_(pa.string()),
         "causes": pa.list_(
             pa.struct(
                 {
