@@ -25,7 +25,7 @@ from .track import Track
 __all__ = ["MOST", "Excerpt", "confirmed", "excerpt"]
 
 MOST = 20_000
-"""Samples above which causes are looked for in an excerpt."""
+"""Samples of an excerpt in which causes are looked for, where there are a quarter more."""
 _CELL = 1000  # samples
 _SETTLED = 12.0  # times the observer's settling that a cell lasts at least
 _MOVING = 0.05  # of the fast speed, at which a cell may end, unless it is

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -138,7 +139,7 @@ def finding_of(
         where=where,
         component=place_of(effect),
         share=share,
-        evidence=_evidence(effect, step, rival, excess),
+        evidence=_evidence(effect, step, rival, excess, len(growth.steps) == 1),
         parameters=parameters,
         noe_before=scored.noe_refit,
         noe_after=scored.noe_augmented,
@@ -146,16 +147,17 @@ def finding_of(
     )
 
 
-def _evidence(effect: Effect, step: Step, rival: Rival | None, excess: float) -> str:
-    """How much an effect explains, beside its best rival, in a sentence."""
+def _evidence(effect: Effect, step: Step, rival: Rival | None, excess: float, alone: bool) -> str:
+    """How much an effect explains, ``alone`` or beside others, and its best rival, in a sentence."""
     beside = (
         f"; the runner-up, {rival.effect.title}, explains {_percent(step.before - rival.left, excess)}"
         if rival is not None
         else ""
     )
+    missing = "the missing force's energy" if alone else "the energy of the force that is missing beside the other effects"
     return (
-        f"{effect.title} explains {_percent(step.before - step.after, excess)} of the missing force's energy, on blocks of the "
-        f"recordings left out of the fit{beside}"
+        f"{effect.title} explains {_percent(step.before - step.after, excess)} of {missing}, on blocks of the recordings left "
+        f"out of the fit{beside}"
     )
 
 
@@ -266,12 +268,13 @@ def rejected_effects(growth: Growth, begin: Model, scales: Scales, learnt: bool)
         name = each.column.term.effect.id
         if name not in there and name not in found and learnt:
             found[name] = f"takes {_percent(each.gain, excess)} away at first order where it was not fitted"
+    most: dict[str, float] = {}  # what each has taken off at best
     for step in growth.steps:
         for rival in step.rivals:
-            if rival.effect.id not in there:
-                found[rival.effect.id] = (
-                    f"fitted in full it takes {_percent(step.before - rival.left, excess)} away, {step.term} more"
-                )
+            name, took = rival.effect.id, step.before - rival.left
+            if name not in there and name not in dict(growth.rejected) and took > most.get(name, -math.inf):
+                most[name] = took
+                found[name] = f"fitted in full it takes {_percent(took, excess)} away, {step.term} more"
     offered = {candidate.effect.id for candidate in candidates(begin, scales)}
     tried = {each.column.term.effect.id for each in first}
     for effect in EFFECTS.values():

@@ -328,7 +328,7 @@ class Diagnosis:
                 "fitted": list(self.fitted_on),
                 "selected": "blocks and halves of the fitted recordings, each left out in turn",
                 "tested": list(self.tested_on),
-                "withdrawn": "what makes the tested recordings worse, or does not show there; nothing else is decided on them",
+                "withdrawn": "effects that make the tested recordings worse or do not show there; what stays there counts",
             },
             "components": [each.as_json() for each in self.components],
             "next_experiment": self.next_experiment,

@@ -36,7 +36,7 @@ def diagnosis_report(found: Diagnosis, train: Sequence[Record], validation: Sequ
     learnt = f"{len(train)} recording{'s' if len(train) > 1 else ''} for training, {len(validation)} held back"
     lead = (
         f"{title[0].upper()}{title[1:]} '{found.given.joint}': {learnt}. Every error here is on recordings "
-        "that no fit has used. They add no finding; they can only withdraw one."
+        "that no fit has used. They add no effect; they can withdraw what was found, and what they show to be left counts."
     )
     sections = [
         Section(
