@@ -45,8 +45,9 @@ def indifference(track: Track, model: Model) -> float:
         # Bristles are springs: they mind all of it. But led by its position, a model shows less of what is missing.
         model = model.with_terms(held for held in model.terms if held.effect.slip is None)
     less, more = mapped(lambda added: track.residual(model, track.with_effort(added)), (-size, size))
-    shown = np.clip((less - more) / (2.0 * size), hidden / size, 1.0)
-    return float(np.mean(np.where(_moves(track), -np.log(shown), 0.0)))
+    # Where the force leads a body to another place, what shows of it swings about one: more counts as much as less.
+    shown = np.clip((less - more) / (2.0 * size), hidden / size, size / hidden)
+    return max(float(np.mean(np.where(_moves(track), -np.log(shown), 0.0))), 0.0)
 
 
 def dearer(track: Track, model: Model) -> float:

@@ -18,6 +18,7 @@ from ..fitting import State, bounds_of, free_names, without_place
 from ..indifference import indifference
 from ..least_squares import Fit
 from ..track import Track
+from .components import COMPONENTS
 from .evidence import Grouped
 from .residual import ALIKE, functions_of, independent_share
 
@@ -42,8 +43,14 @@ class Asked:
 
     @cached_property
     def _functions(self) -> tuple[dict[str, Array], slice]:
-        groups, rows, _ = functions_of(self._track, self._state)
+        groups, rows, _ = functions_of(self._track, self._state.fit.model)
         return groups, rows
+
+    def _functions_without(self, place: int) -> tuple[dict[str, Array], slice]:
+        """The functions, those of the force along the motion without the term number ``place``, and their rows."""
+        groups, rows = self._functions
+        of_force = [each for each in COMPONENTS if each.of_force]
+        return {**groups, **functions_of(self._track, self.without(place).model, of_force)[0]}, rows
 
     def without(self, place: int) -> Fit:
         """The model without its term number ``place``, everything else fitted anew."""
@@ -56,7 +63,7 @@ class Asked:
     def nats(self, place: int) -> float:
         """Evidence for the term number ``place`` of the model, the dependence of the rows counted [nats]."""
         fit = self._state.fit
-        without, (groups, rows) = self.without(place), self._functions
+        without, (groups, rows) = self.without(place), self._functions_without(place)
         change = (without.residual - fit.residual)[rows, None]
         size = float(np.sqrt(np.mean(change**2)))
         if size == 0.0:

@@ -86,12 +86,14 @@ class Component:
         title: its name in a sentence.
         place: part of the machine.
         columns: functions along one run, shape ``(n, k)``, with the same k for every run.
+        of_force: True where they depend on the force that the model needs along the motion.
     """
 
     id: str
     title: str
     place: str
     columns: Callable[[Along, Ranges], Array]
+    of_force: bool = False
 
 
 def _bumps(x: Array, n: int, low: float, high: float) -> Array:
@@ -169,13 +171,14 @@ COMPONENTS: tuple[Component, ...] = (
         "friction that follows the driving force",
         "transmission",
         lambda s, r: (np.abs(s.force) * s.sign)[:, None],
+        of_force=True,
     ),
     Component("force-position", "force over position", "load", _over_place),
     Component(COMB, "force that repeats over position", "load", _comb),
     Component("force-time", "force over time", "load", _over_time),
     Component("inertia-time", "inertia over time", "load", lambda s, r: _over_time(s, r) * s.acceleration[:, None]),
     Component("inertia-position", "inertia over position", "load", lambda s, r: _over_place(s, r) * s.acceleration[:, None]),
-    Component("command", "command path", "command path", _command),
+    Component("command", "command path", "command path", _command, of_force=True),
 )
 """The components with functions along the measured motion."""
 
@@ -187,7 +190,7 @@ def _nothing(s: Along, r: Ranges) -> Array:
 OTHERS: dict[str, Component] = {
     each.id: each
     for each in (
-        Component("command", "command path", "command path", _command),
+        Component("command", "command path", "command path", _command, of_force=True),
         Component("transmission", "transmission between drive and body", "transmission", _nothing),
         Component("friction-states", "friction before it slides", "guideway friction", _nothing),
         Component("load-states", "what hangs on the body", "load", _nothing),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from ...model import Term
+from ...model import Model, Term
 from ...record import Array
 from ...threads import mapped
 from ..along import REST
@@ -116,7 +116,7 @@ class Additive:
 
 def additive(track: Track, state: State) -> Additive:
     """Take apart what the fitted model of ``state`` lacks on ``track``."""
-    groups, rows, ranges = functions_of(track, state)
+    groups, rows, ranges = functions_of(track, state.fit.model)
     laws = _laws(track, state, rows, _strongest_periods(state, rows, groups, ranges))
     places = _places(state, rows, groups, laws)
     for k, place in places.items():
@@ -150,14 +150,23 @@ def additive(track: Track, state: State) -> Additive:
     )  # fmt: skip
 
 
-def functions_of(track: Track, state: State) -> tuple[dict[str, Array], slice, Ranges]:
-    """The functions of each component as the observer sees them, by its id, at which rows of the residual, and their ranges."""
-    signals = _signals(track, state)
+def functions_of(
+    track: Track, model: Model, components: Sequence[Component] = COMPONENTS
+) -> tuple[dict[str, Array], slice, Ranges]:
+    """The functions of ``components`` as the observer sees them, by their ids, at which rows of the residual, and their ranges.
+
+    Args:
+        track: the recordings.
+        model: that gives the force along the motion. It must not have what is to be told from these functions: one of a force
+            that has a ripple repeats over position, too.
+        components: whose functions.
+    """
+    signals = _signals(track, model)
     ranges = _ranges(track, signals)
     stride = max(round(_THIN / (track.bandwidth * min(run.sample_time for run in track.runs))), 1)
     rows = slice(stride // 2, None, stride)
     groups = {}
-    for component in COMPONENTS:
+    for component in components:
         per_run = [component.columns(each, ranges) for each in signals]
         seen = np.stack([track.seen([part[:, k] for part in per_run]) for k in range(per_run[0].shape[1])], axis=1)[rows]
         if float(np.max(np.abs(seen))) > 0.0:
@@ -255,8 +264,7 @@ def independent_values(track: Track, residual: Array) -> float:
     return independent_share(residual[::apart]) * float(residual.shape[0]) / apart
 
 
-def _signals(track: Track, state: State) -> list[Along]:
-    model = state.fit.model
+def _signals(track: Track, model: Model) -> list[Along]:
     fast = max(float(np.quantile(np.abs(np.concatenate([each.velocity for each in track.motion])), 0.98)), 1e-300)
     rest = max(REST * fast, 4.0 * max(track.noise) * track.bandwidth)
     found = []

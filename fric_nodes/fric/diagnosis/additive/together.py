@@ -39,6 +39,7 @@ _PLAUSIBLE = 0.3  # probability among the laws of its component
 _ROUNDS = 6  # numerical: in each at least one term comes
 _ROUNDS_BESIDE = 3  # numerical: what comes later mends what the first has taken for something else
 _TO_WEIGH = 8  # numerical, iterations from where everything fits
+_AT_ONCE = 20  # numerical, iterations from where nothing fits
 
 
 def middle_of(tracks: Sequence[Track]) -> Track:
@@ -79,16 +80,20 @@ def grown_together(
 
 
 def _fitted(track: Track, state: State, offered: Sequence[Form], tell: Callable[[str], None]) -> State:
-    """``state`` with the laws ``offered``, fitted together; with the better half of them where all are too many to begin with.
+    """``state`` with the laws ``offered``, fitted together, or with as many of the strongest of them as leave least.
 
-    Each was weighed by itself: of laws that do the same work all together may overshoot so far that no fit comes back.
+    Each was weighed by itself: of laws that do the same work all together may overshoot so far that no fit comes back, and one
+    that minds the effort little takes from a stronger one what could lead its fit. So the strongest is fitted first, and the
+    others come to what it has come to, twice as many each time; beside that, all are fitted at once.
     """
-    while True:
-        tell("trying together: " + ", ".join(f"{each.term.effect.title} ({each.nats:.0f} nats)" for each in offered))
-        whole = refit(track, state.fit.model.with_terms((*state.fit.model.terms, *(each.term for each in offered))), 20)
-        if whole.excess < state.excess or len(offered) == 1:
-            return whole
-        offered = offered[: len(offered) // 2]
+    tell("trying together: " + ", ".join(f"{each.term.effect.title} ({each.nats:.0f} nats)" for each in offered))
+    fitted = [refit(track, state.fit.model.with_terms((*state.fit.model.terms, *(each.term for each in offered))), _AT_ONCE)]
+    model, there = state.fit.model, 0
+    while len(offered) > 1 and there < len(offered):
+        coming = offered[there : max(2 * there, 1)]
+        fitted.append(refit(track, model.with_terms((*model.terms, *(each.term for each in coming))), _TO_WEIGH))
+        model, there = fitted[-1].fit.model, there + len(coming)
+    return min(fitted, key=lambda each: each.left)
 
 
 def _offered(state: State, forms: list[Form]) -> Iterator[Form]:
