@@ -60,9 +60,9 @@ def drawn_controller(setting: Setting, sampled: bool, random: np.random.Generato
     return Controller(
         kind=kind,
         rate=0.0 if kind == CONTINUOUS else rate,
-        stiffness=mass * bandwidth**2 * float(random.uniform(0.6, 1.2)),
-        damping=mass * bandwidth * float(random.uniform(1.4, 2.0)),
+        stiffness=mass * bandwidth**2 * float(random.uniform(0.6, 1.1)),
+        damping=mass * bandwidth * float(random.uniform(1.2, 1.7)),
         integral=bandwidth * float(random.uniform(0.05, 0.25)) if kind == CASCADE else 0.0,
-        smoothing=0.12 / bandwidth,
+        smoothing=0.06 / bandwidth,
         largest=_LARGEST * usual,
     )

@@ -1,8 +1,9 @@
 """What an axis of other hands does: the motions of work, not those of an experiment.
 
-Point-to-point moves with rests, sweeps to and fro at constant speeds, and jogging: short moves at low speeds in which
-somebody looks for a place. Speeds are trapezoids behind a moving average, which limits the jerk as motion controllers do.
-A recording is a random sequence of the three until its time is over; no force is added to the controller's.
+Point-to-point moves with rests, sweeps to and fro at constant speeds, jogging (short moves at low speeds in which somebody
+looks for a place), and a swept sine as of a commissioning. Speeds of moves are trapezoids behind a moving average, which
+limits the jerk as motion controllers do. A recording is a random sequence of the four until its time is over; no force is
+added to the controller's.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from ..excitation import Axis
 __all__ = ["drawn_motion"]
 
 _REST = (0.1, 1.2)  # [s] between two moves
-_ROUNDED = (0.02, 0.08)  # [s] of the moving average
+_ROUNDED = (0.01, 0.06)  # [s] of the moving average
 _WITHIN = 0.45  # of the travel, on each side of its middle
 _ENDS = 0.3  # [s] at rest, first and last
 
@@ -54,6 +55,10 @@ class _Walk:
         self._add(shape * (goal - self.place) / (float(np.sum(shape)) * h))
         self.place = goal
 
+    def swing(self, speed: Array) -> None:
+        """This speed, less its mean: it ends where it began."""
+        self._add(speed - float(np.mean(speed)))
+
     def _add(self, speed: Array) -> None:
         self.way.append(speed)
         self.time += speed.shape[0] * self.axis.sample_time
@@ -64,7 +69,7 @@ def _point_to_point(walk: _Walk) -> None:
     for _ in range(int(random.integers(3, 7))):
         goal = float(random.uniform(-_WITHIN, _WITHIN)) * axis.travel
         quick = float(np.exp(random.uniform(np.log(0.15), 0.0)))
-        walk.go(goal, quick * axis.top_speed, axis.acceleration * float(random.uniform(0.5, 1.0)))
+        walk.go(goal, quick * axis.top_speed, axis.acceleration * float(random.uniform(0.5, 2.0)))
         walk.rest(float(random.uniform(*_REST)))
 
 
@@ -92,7 +97,23 @@ def _jogging(walk: _Walk) -> None:
             side = -side
 
 
-_WORK: tuple[Callable[[_Walk], None], ...] = (_point_to_point, _sweeps, _jogging)
+def _swept_sine(walk: _Walk) -> None:
+    """From a slow swing to a quick one (exponential sweep; Farina 2000), whose speed and acceleration stay usual."""
+    axis, random = walk.axis, walk.random
+    walk.go(0.2 * walk.place, 0.5 * axis.top_speed, axis.acceleration)
+    time, low, high = float(random.uniform(3.0, 6.0)), 0.5, float(random.uniform(4.0, 8.0))
+    n = round(time / axis.sample_time)
+    ratio = np.log(high / low)
+    at = np.arange(n) / n
+    frequency = low * np.exp(ratio * at)
+    phase = 2.0 * np.pi * time / ratio * (frequency - low)
+    top = np.minimum(0.7 * axis.top_speed, 1.5 * axis.acceleration / (2.0 * np.pi * frequency))
+    top = np.minimum(top, 0.15 * axis.travel * 2.0 * np.pi * frequency)
+    speed = top * np.sin(phase) * np.minimum(1.0, np.minimum(at, 1.0 - at) * time / 0.3)
+    walk.swing(speed)
+
+
+_WORK: tuple[Callable[[_Walk], None], ...] = (_point_to_point, _sweeps, _jogging, _swept_sine)
 
 
 def drawn_motion(axis: Axis, duration: float, random: np.random.Generator) -> tuple[Array, Array]:
@@ -100,7 +121,7 @@ def drawn_motion(axis: Axis, duration: float, random: np.random.Generator) -> tu
     walk = _Walk(axis, random)
     walk.rest(_ENDS)
     while walk.time < duration:
-        # Each of the three once in every round, so that none is missing where they are long.
+        # Each of them once in every round, so that none is missing where they are long.
         for number in random.permutation(len(_WORK)):
             if walk.time < duration:
                 _WORK[int(number)](walk)
