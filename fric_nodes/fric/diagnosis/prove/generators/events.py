@@ -104,7 +104,7 @@ def _lead(
     reference: Any, feedforward: Any, load: Any, warmer: Any, windows: Any, noise: Any, out: Any,
 ) -> float:  # fmt: skip
     n, lines, largest, resolution = reference.shape[0], waiting.shape[1], gains[4], gains[5]
-    x, mode, now, memory = np.zeros(N_STATES), np.zeros(3), np.zeros(12), np.zeros(4)
+    x, mode, now, memory = np.zeros(N_STATES), np.zeros(3), np.zeros(13), np.zeros(4)
     work, turned = np.zeros((9, N_STATES)), np.zeros(1)
     first_state(p, x, mode, reference[0])
     if analogue:
@@ -136,6 +136,7 @@ def _lead(
             wanted = now[5] + now[6] * (t - now[7])
             u = _sampled(gains, memory, measured, wanted, now[6], now[8], period)
             waiting[0, last % lines], waiting[1, last % lines] = t + p.delay, u
+            now[12] = u
             last += 1
             tick += 1
         while first < last and waiting[0, first % lines] <= t + _SAME:

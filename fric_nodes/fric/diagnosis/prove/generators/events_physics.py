@@ -49,9 +49,10 @@ _Q, _V, _Y, _W, _F, _HEAT, _LEVEL, _AGE, _STRETCH, _GREASE, _HUNG, _HUNG_RATE, _
 N_STATES = 13
 # Modes.
 _SLIP, _SIDE, _CHAIN = range(3)
-# What holds between two instants: command [N], relative load, temperature less nominal, whether disturbed, mass that joined,
-# and for a continuous controller its reference, that one's rate, since when, its feedforward, and its gains.
-_U, _LOAD, _WARMER, _DIRTY, _JOINED, _WANTED, _RATE, _SINCE, _AHEAD, _KP, _KD, _MOST = range(12)
+# What holds between two instants: command that has arrived [N], relative load, temperature less nominal, whether disturbed, mass that joined,
+# for a continuous controller its reference, that one's rate, since when, its feedforward, and its gains; last the command that
+# was given, which may still be on its way.
+_U, _LOAD, _WARMER, _DIRTY, _JOINED, _WANTED, _RATE, _SINCE, _AHEAD, _KP, _KD, _MOST, _GIVEN = range(13)
 
 _FAST: dict[str, Any] = {"error_model": "numpy", "nogil": True, "cache": True}
 _TURN = 2.0 * math.pi
@@ -234,17 +235,16 @@ def slopes(p: Any, x: Any, mode: Any, now: Any, t: float, dx: Any) -> None:
     dx[_Y], dx[_W] = x[_W], 0.0
     if two:
         dx[_W] = a if together else (f - drive) / motor
-    dx[_F] = (_amplified(p, now[_U]) - x[_F]) / p.actuator_time if p.actuator == 1.0 else 0.0
-    if p.actuator == 1.0 and (now[_KP] != 0.0 or now[_KD] != 0.0):
-        dx[_F] = (_amplified(p, u) - x[_F]) / p.actuator_time
-    dx[_HEAT] = ((u / p.heat_force) ** 2 - x[_HEAT]) / p.heat_time
+    dx[_F] = (_amplified(p, u) - x[_F]) / p.actuator_time if p.actuator == 1.0 else 0.0
+    given = u if now[_KP] != 0.0 or now[_KD] != 0.0 else now[_GIVEN]
+    dx[_HEAT] = ((given / p.heat_force) ** 2 - x[_HEAT]) / p.heat_time
     dx[_LEVEL] = (_raw_level(p, abs(v), x[_AGE]) - x[_LEVEL]) / p.lag_time if p.lag > 0.0 else 0.0
     dx[_AGE] = 1.0 - x[_AGE] * abs(v) / p.dwell_length if p.dwell > 0.0 else 0.0
     dx[_GREASE] = (1.0 - x[_GREASE]) / p.thixotropy_time - p.thixotropy_shear * abs(v) * x[_GREASE]
     dx[_HUNG], dx[_HUNG_RATE] = 0.0, 0.0
     if p.appendage > 0.0:
         dx[_HUNG], dx[_HUNG_RATE] = x[_HUNG_RATE] - v, -_hung(p, x)
-    dx[_IMPULSE] = u
+    dx[_IMPULSE] = given
 
 
 @njit(**_FAST)
