@@ -33,8 +33,9 @@ from ...model_file import model_to_text
 from ...record import Record
 from .axis import draw_setting
 from .concealed import CONCEALED, Changes, Concealed, clash
+from .course import Unreachable
 from .excitation import drawn_reference
-from .experiment import Bench, Unreachable, draw_recording, turned
+from .experiment import Bench, draw_recording, turned
 from .generators import GENERATORS
 from .generators.controllers import drawn_controller
 from .generators.generator import Hand

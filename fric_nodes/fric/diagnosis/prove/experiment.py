@@ -15,22 +15,19 @@ import numpy as np
 
 from ...record import Array
 from .axis import Setting
+from .course import Course, Run, Unreachable
 from .excitation import Axis, Piece, drawn_reference
 from .physics import Physics
 from .reckoning import Nominal, Remainder, balance, floor_of, refit
-from .truth import Course, Loop, Run, integrate
+from .truth import Loop, integrate
 
-__all__ = ["Bench", "Recording", "Unreachable", "draw_recording"]
+__all__ = ["Bench", "Recording", "draw_recording"]
 
 _TRIALS = 9
 _KEPT = 4
 _WARM = 9.0  # [K], usual deviation of the temperature
 _LOADED = 0.3  # usual relative deviation of the normal load
 _SHARE_OF_ENCODER = 0.3  # of the noise floor
-
-
-class Unreachable(Exception):
-    """This axis can't show the effect with the strength wanted; another one is drawn."""
 
 
 @dataclass(frozen=True, eq=False)

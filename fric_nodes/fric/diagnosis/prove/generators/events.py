@@ -18,20 +18,17 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from ....record import Array
-from ..experiment import Unreachable
+from ..course import Course, Run, Unreachable
 from ..physics import Physics
-from ..truth import Course, Run
 from .controllers import CONTINUOUS, Controller
-from .events_physics import HONOURED, N_STATES, encoder, first_state, numbers
+from .events_physics import HONOURED, N_STATES, compiled, encoder, first_state, numbers
 from .events_steps import CHATTERS, advance
 from .generator import Generator
 
 __all__ = ["EVENTS"]
 
-_FAST: dict[str, Any] = {"error_model": "numpy", "nogil": True, "cache": True}
 _SAME = 1e-11  # [s]: instants that are one
 _SMALL = 1e-9  # of the usual size of a state: the absolute part of its error
 
@@ -75,7 +72,7 @@ def _absolute(physics: Physics, controller: Controller, course: Course) -> Array
     return _SMALL * np.array(usual)
 
 
-@njit(**_FAST)
+@compiled
 def _sampled(gains: Any, memory: Any, measured: float, wanted: float, rate: float, ahead: float, period: float) -> float:
     """Command of a sampled controller; its memory: position before, speed, integral, whether that has begun."""
     stiffness, damping, integral, smoothing, largest, _ = gains
@@ -90,7 +87,7 @@ def _sampled(gains: Any, memory: Any, measured: float, wanted: float, rate: floa
     return float(min(max(u, -largest), largest))
 
 
-@njit(**_FAST)
+@compiled
 def _disturbed(windows: Any, t: float) -> float:
     for j in range(windows.shape[0]):
         if windows[j, 0] <= t + _SAME and t + _SAME < windows[j, 1]:
@@ -98,7 +95,7 @@ def _disturbed(windows: Any, t: float) -> float:
     return 0.0
 
 
-@njit(**_FAST)
+@compiled
 def _lead(
     p: Any, gains: Any, period: float, analogue: bool, waiting: Any, edges: Any, absolute: Any, sample_time: float,
     reference: Any, feedforward: Any, load: Any, warmer: Any, windows: Any, noise: Any, out: Any,

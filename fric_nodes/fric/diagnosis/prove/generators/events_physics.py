@@ -12,26 +12,31 @@ Laws: Stribeck 1902 in Gaussian form (Bo, Pavelescu 1982), logarithmic ageing of
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
 
+from ..physics import Physics
 from .generator import ANY, Honoured
 
-__all__ = ["HONOURED", "N_STATES", "encoder", "first_state", "margins", "numbers", "settled", "slopes"]
+__all__ = ["HONOURED", "N_STATES", "compiled", "encoder", "first_state", "margins", "numbers", "settled", "slopes"]
 
 _USUAL: tuple[float, ...] = (0.0,)
 _FIRST = (0.0, 1.0)
-_EVERY = """
-    mass load_share coulomb viscous bias stribeck stribeck_velocity asymmetry asymmetry_viscous drag drag_velocity shear
-    shear_velocity displacement presliding_damping lag_time dwell dwell_time dwell_length load temperature temperature_viscous
-    spot spot_position spot_width wave_cosine wave_sine wave_period drift drift_time ripple_cosine ripple_sine ripple_period
-    stiffness stiffness_position cubic cubic_position gap stop_stiffness stop_damping shaft shaft_damping appendage
-    appendage_frequency appendage_damping limit dead_zone delay actuator_time payload payload_time heat heat_time heat_force
-    dip cable cable_play cable_position dirt floor floor_frequency gear gain_ripple gain_ripple_period thixotropy
-    thixotropy_time thixotropy_shear eccentricity eccentricity_period
-""".split()
+_EVERY = (
+    *("mass", "load_share", "coulomb", "viscous", "bias", "stribeck", "stribeck_velocity", "asymmetry", "asymmetry_viscous"),
+    *("drag", "drag_velocity", "shear", "shear_velocity", "displacement", "presliding_damping", "lag_time"),
+    *("dwell", "dwell_time", "dwell_length", "load", "temperature", "temperature_viscous", "drift", "drift_time"),
+    *("spot", "spot_position", "spot_width", "wave_cosine", "wave_sine", "wave_period"),
+    *("ripple_cosine", "ripple_sine", "ripple_period", "stiffness", "stiffness_position", "cubic", "cubic_position"),
+    *("gap", "stop_stiffness", "stop_damping", "shaft", "shaft_damping"),
+    *("appendage", "appendage_frequency", "appendage_damping", "limit", "dead_zone", "delay", "actuator_time"),
+    *("payload", "payload_time", "heat", "heat_time", "heat_force", "dip", "cable", "cable_play", "cable_position", "dirt"),
+    *("floor", "floor_frequency", "gear", "gain_ripple", "gain_ripple_period"),
+    *("thixotropy", "thixotropy_time", "thixotropy_shear", "eccentricity", "eccentricity_period"),
+)
 # ``gear_driven`` acts in another form alone. A level that jumps with the sign of the acceleration (``acceleration``) isn't
 # among these: it has no smooth modes, but would switch infinitely often.
 HONOURED: Honoured = {
@@ -49,13 +54,18 @@ _Q, _V, _Y, _W, _F, _HEAT, _LEVEL, _AGE, _STRETCH, _GREASE, _HUNG, _HUNG_RATE, _
 N_STATES = 13
 # Modes.
 _SLIP, _SIDE, _CHAIN = range(3)
-# What holds between two instants: command that has arrived [N], relative load, temperature less nominal, whether disturbed, mass that joined,
-# for a continuous controller its reference, that one's rate, since when, its feedforward, and its gains; last the command that
-# was given, which may still be on its way.
+# What holds between two instants: command that has arrived [N], relative load, temperature less nominal, whether disturbed,
+# mass that joined; for a continuous controller its reference, that one's rate, since when, its feedforward, and its gains;
+# last the command that was given, which may still be on its way.
 _U, _LOAD, _WARMER, _DIRTY, _JOINED, _WANTED, _RATE, _SINCE, _AHEAD, _KP, _KD, _MOST, _GIVEN = range(13)
 
-_FAST: dict[str, Any] = {"error_model": "numpy", "nogil": True, "cache": True}
 _TURN = 2.0 * math.pi
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def compiled(function: Function) -> Function:
+    """``function`` in machine code that is kept on disk."""
+    return cast(Function, njit(error_model="numpy", nogil=True, cache=True)(function))
 
 
 def numbers(physics: Physics) -> Any:
@@ -66,7 +76,7 @@ def numbers(physics: Physics) -> Any:
     return held[0]
 
 
-@njit(**_FAST)
+@compiled
 def first_state(p: Any, x: Any, mode: Any, place: float) -> None:
     """At rest at ``place``, the contact as young as can be."""
     x[:] = 0.0
@@ -78,7 +88,7 @@ def first_state(p: Any, x: Any, mode: Any, place: float) -> None:
     mode[_CHAIN] = place
 
 
-@njit(**_FAST)
+@compiled
 def encoder(p: Any, x: Any) -> tuple[float, float]:
     """Position [m] that the encoder turns with, and its rate [m/s]: the motor's where there is one."""
     place, rate = (x[_Y], x[_W]) if p.load_share > 0.0 else (x[_Q], x[_V])
@@ -89,7 +99,7 @@ def encoder(p: Any, x: Any) -> tuple[float, float]:
     return place, rate
 
 
-@njit(**_FAST)
+@compiled
 def _command(p: Any, x: Any, now: Any, t: float) -> float:
     """Command [N]: the one that is held, or that of an analogue loop."""
     if now[_KP] == 0.0 and now[_KD] == 0.0:
@@ -100,7 +110,7 @@ def _command(p: Any, x: Any, now: Any, t: float) -> float:
     return float(min(max(u, -now[_MOST]), now[_MOST]))
 
 
-@njit(**_FAST)
+@compiled
 def _amplified(p: Any, u: float) -> float:
     if p.limit > 0.0:
         u = min(max(u, -p.limit), p.limit)
@@ -109,7 +119,7 @@ def _amplified(p: Any, u: float) -> float:
     return u
 
 
-@njit(**_FAST)
+@compiled
 def _motor_force(p: Any, x: Any, now: Any, u: float) -> float:
     """Force [N] of the motor."""
     f = x[_F] if p.actuator == 1.0 else _amplified(p, u)
@@ -120,14 +130,14 @@ def _motor_force(p: Any, x: Any, now: Any, u: float) -> float:
     return float(f * (1.0 - p.dip) if now[_DIRTY] > 0.0 else f)
 
 
-@njit(**_FAST)
+@compiled
 def _elastic(p: Any, x: Any, side: float) -> float:
     """Force [N] that a soft stop on this side would pass on."""
     deep = x[_Y] - x[_Q] - 0.5 * side * p.gap
     return float(p.stop_stiffness * deep + p.stop_damping * (x[_W] - x[_V]))
 
 
-@njit(**_FAST)
+@compiled
 def _transmitted(p: Any, x: Any, mode: Any, f: float) -> float:
     """Force [N] that drives the body."""
     if p.load_share == 0.0:
@@ -139,14 +149,14 @@ def _transmitted(p: Any, x: Any, mode: Any, f: float) -> float:
     return _elastic(p, x, mode[_SIDE]) if p.stop_stiffness > 0.0 else f
 
 
-@njit(**_FAST)
+@compiled
 def _hung(p: Any, x: Any) -> float:
     """Acceleration [m/s^2] that pulls the appendage back to the body."""
     a = _TURN * p.appendage_frequency
     return float(a * a * x[_HUNG] + 2.0 * p.appendage_damping * a * (x[_HUNG_RATE] - x[_V]))
 
 
-@njit(**_FAST)
+@compiled
 def _resistance(p: Any, x: Any, mode: Any, now: Any, t: float) -> float:
     """Forces [N] on the body but contact friction and drive."""
     q, v = x[_Q], x[_V]
@@ -170,14 +180,14 @@ def _resistance(p: Any, x: Any, mode: Any, now: Any, t: float) -> float:
     return float(f)
 
 
-@njit(**_FAST)
+@compiled
 def _raw_level(p: Any, speed: float, age: float) -> float:
     """Level [N] of Coulomb, Stribeck and rest."""
     level = p.coulomb + p.stribeck * math.exp(-((speed / p.stribeck_velocity) ** 2))
     return float(level + p.dwell * math.log1p(max(age, 0.0) / p.dwell_time) if p.dwell > 0.0 else level)
 
 
-@njit(**_FAST)
+@compiled
 def _level(p: Any, x: Any, now: Any, t: float, way: float, drive: float) -> float:
     """Level [N] of a contact that slides, or would slide, this ``way``."""
     level = x[_LEVEL] if p.lag > 0.0 else _raw_level(p, abs(x[_V]), x[_AGE])
@@ -193,23 +203,23 @@ def _level(p: Any, x: Any, now: Any, t: float, way: float, drive: float) -> floa
         level *= 1.0 + p.drift * t
     if now[_DIRTY] > 0.0:
         level *= 1.0 + p.dirt
-    return max(float(level), 0.0) + p.gear * abs(drive)
+    return float(max(level, 0.0) + p.gear * abs(drive))
 
 
-@njit(**_FAST)
+@compiled
 def _over(p: Any, x: Any, now: Any, t: float, drive: float, push: float) -> float:
     """By how much the push on a body at rest is beyond the break-away force [N], either way."""
     way = 1.0 if push >= 0.0 else -1.0
     return float(abs(push) - _level(p, x, now, t, way, drive))
 
 
-@njit(**_FAST)
+@compiled
 def _coupled(p: Any, mode: Any) -> bool:
     """Whether motor and load are one body for now."""
     return bool(p.gap > 0.0 and p.stop_stiffness == 0.0 and p.shaft == 0.0 and mode[_SIDE] != 0.0)
 
 
-@njit(**_FAST)
+@compiled
 def slopes(p: Any, x: Any, mode: Any, now: Any, t: float, dx: Any) -> None:
     """Rates of all states within a mode."""
     u = _command(p, x, now, t)
@@ -247,7 +257,7 @@ def slopes(p: Any, x: Any, mode: Any, now: Any, t: float, dx: Any) -> None:
     dx[_IMPULSE] = given
 
 
-@njit(**_FAST)
+@compiled
 def margins(p: Any, x: Any, mode: Any, now: Any, t: float, dx: Any) -> tuple[float, float]:
     """By how much the contact and the transmission are beyond the end of their mode: no more than zero within it."""
     f = _motor_force(p, x, now, _command(p, x, now, t))
@@ -270,7 +280,7 @@ def margins(p: Any, x: Any, mode: Any, now: Any, t: float, dx: Any) -> tuple[flo
     return contact, abs(ahead) - 0.5 * p.gap if closing * toward > 0.0 else -1.0
 
 
-@njit(**_FAST)
+@compiled
 def _stopped(p: Any, x: Any, mode: Any, now: Any, t: float) -> None:
     """A body that has come to rest: it sticks, or is pushed on either way."""
     x[_V] = 0.0
@@ -284,7 +294,7 @@ def _stopped(p: Any, x: Any, mode: Any, now: Any, t: float) -> None:
         mode[_SLIP] = 1.0 if push > 0.0 else -1.0
 
 
-@njit(**_FAST)
+@compiled
 def settled(p: Any, x: Any, mode: Any, now: Any, t: float, contact: float, side: float) -> None:
     """The mode after those that these margins end."""
     if side > 0.0:
@@ -307,5 +317,3 @@ def settled(p: Any, x: Any, mode: Any, now: Any, t: float, contact: float, side:
             mode[_SLIP] = -mode[_SLIP]
         else:
             _stopped(p, x, mode, now, t)
-
-

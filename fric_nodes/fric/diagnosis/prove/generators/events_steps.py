@@ -1,4 +1,4 @@
-"""From one instant to the next, event by event: Dormand and Prince's pair of order 5 and 4, and a bisection for where a mode ends.
+"""From one instant to the next, event by event: a Runge-Kutta pair of order 5 and 4, and a bisection for where a mode ends.
 
 Dormand, Prince, "A family of embedded Runge-Kutta formulae", J. Comp. Appl. Math. 6 (1980), table 2. An event is found by steps
 from the same beginning that are cut in half until the end of the mode is known to 1e-13 s; the step that is kept is the one
@@ -10,13 +10,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from .events_physics import N_STATES, margins, settled, slopes
+from .events_physics import N_STATES, compiled, margins, settled, slopes
 
 __all__ = ["CHATTERS", "advance"]
 
-_FAST: dict[str, Any] = {"error_model": "numpy", "nogil": True, "cache": True}
 _A = np.array(
     [
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -39,7 +37,7 @@ CHATTERS = -1.0
 """Instead of a length of step: more events than anything but an endless chain of them has."""
 
 
-@njit(**_FAST)
+@compiled
 def _stepped(p: Any, x: Any, mode: Any, now: Any, t: float, h: float, k: Any, after: Any, absolute: Any) -> float:
     """``after`` a step of ``h`` [s]; its error over what is allowed."""
     for stage in range(7):
@@ -58,13 +56,13 @@ def _stepped(p: Any, x: Any, mode: Any, now: Any, t: float, h: float, k: Any, af
     return worst
 
 
-@njit(**_FAST)
+@compiled
 def _ended(p: Any, x: Any, mode: Any, now: Any, t: float, dx: Any) -> bool:
     contact, side = margins(p, x, mode, now, t, dx)
     return bool(contact > 0.0 or side > 0.0)
 
 
-@njit(**_FAST)
+@compiled
 def advance(
     p: Any, x: Any, mode: Any, now: Any, begin: float, end: float, h: float, work: Any, absolute: Any, turned: Any
 ) -> float:
@@ -108,14 +106,10 @@ def advance(
         t += step
         mode[2] = min(max(mode[2], x[0] - p.cable_play), x[0] + p.cable_play)
         turned[0] += step * _way(before, x[3] if two else x[1])
-        if error > 0.0:
-            h = max(whole * min(5.0, 0.9 * error**-0.2), _LEAST)
-        else:
-            h = 5.0 * whole
-    return h
+        h = max(whole * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), _LEAST)
 
 
-@njit(**_FAST)
+@compiled
 def _way(before: float, after: float) -> float:
     """Mean sign of a speed that goes from ``before`` to ``after`` in a straight line."""
     size = abs(before) + abs(after)

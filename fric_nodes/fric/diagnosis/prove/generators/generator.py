@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ....errors import InputError
+from ..course import Course, Run
 from ..physics import Physics
-from ..truth import Course, Run
 from .controllers import Controller
 
 __all__ = ["ANY", "Generator", "Hand", "Honoured"]

@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 
 from ....errors import InputError
+from ..course import Course, Run
 from ..physics import Physics
-from ..truth import Course, Run
 from .controllers import CONTINUOUS, Controller
 from .generator import ANY, Generator, Honoured
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ctypes
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
 
 import numba.experimental.function_type  # noqa: F401  # lets compiled code be handed a function of another library
 import numpy as np
@@ -17,7 +18,6 @@ from numba import njit, types
 
 __all__ = ["Foreign", "run"]
 
-_FAST: dict[str, Any] = {"error_model": "numpy", "nogil": True, "cache": True}
 _TWO_PI = 2.0 * math.pi
 _QUICK = 1e-3  # [s], over which the sign of the acceleration is taken
 _CREEP = 1e-3  # of the speed that a step gives at the level's acceleration: ten times what a constraint creeps at
@@ -27,8 +27,15 @@ _CREEP = 1e-3  # of the speed that a step gives at the level's acceleration: ten
 # integral, whether it has begun.
 _FORCE, _HEAT, _LEVEL, _BEGUN, _AGE, _RISE, _BENT, _GREASE, _CHAIN, _U, _BEFORE, _SPEED, _SUM, _RUNS = range(14)
 
+Function = TypeVar("Function", bound=Callable[..., Any])
 
-class Foreign(types.WrapperAddressProtocol):  # type: ignore[misc]
+
+def compiled(function: Function) -> Function:
+    """``function`` in machine code that is kept on disk."""
+    return cast(Function, njit(error_model="numpy", nogil=True, cache=True)(function))
+
+
+class Foreign(types.WrapperAddressProtocol):
     """A C function of two addresses that gives nothing back."""
 
     def __init__(self, function: Any) -> None:
@@ -42,7 +49,7 @@ class Foreign(types.WrapperAddressProtocol):  # type: ignore[misc]
         return types.void(types.intp, types.intp)
 
 
-@njit(**_FAST)
+@compiled
 def _read(p: Any, at: Any, rate: Any) -> tuple[float, float]:
     """Encoder: position [m] and its rate [m/s]."""
     q, v = at[0], rate[0]
@@ -54,7 +61,7 @@ def _read(p: Any, at: Any, rate: Any) -> tuple[float, float]:
     return q + p.eccentricity * math.sin(k * q), v + v * k * p.eccentricity * math.cos(k * q)
 
 
-@njit(**_FAST)
+@compiled
 def _controlled(
     gains: Any, m: Any, place: float, speed: float, wanted: float, rate: float, ahead: float, every: float
 ) -> float:
@@ -75,7 +82,7 @@ def _controlled(
     return float(max(-most, min(most, u)))
 
 
-@njit(**_FAST)
+@compiled
 def _driving(p: Any, m: Any, line: Any, u: float, q: float, disturbed: bool, h: float, count: int) -> float:
     """Force [N] of the motor."""
     f = u
@@ -99,7 +106,7 @@ def _driving(p: Any, m: Any, line: Any, u: float, q: float, disturbed: bool, h: 
     return float(f)
 
 
-@njit(**_FAST)
+@compiled
 def _braking(p: Any, m: Any, q: float, v: float, t: float) -> float:
     """Forces [N] against the body that MuJoCo's damping and friction are not."""
     size = abs(v)
@@ -116,7 +123,7 @@ def _braking(p: Any, m: Any, q: float, v: float, t: float) -> float:
     return float(f + p.floor * math.sin(_TWO_PI * p.floor_frequency * t))
 
 
-@njit(**_FAST)
+@compiled
 def _between(p: Any, at: Any, rate: Any, f: float, extra: Any) -> float:
     """Force [N] that reaches the load; ``extra[1]`` is what the stops' damping adds to MuJoCo's spring."""
     if p.load_share == 0.0:
@@ -136,7 +143,7 @@ def _between(p: Any, at: Any, rate: Any, f: float, extra: Any) -> float:
     return f if deep > -1e-4 * p.gap else 0.0
 
 
-@njit(**_FAST)
+@compiled
 def _level(
     p: Any, m: Any, q: float, v: float, way: float, t: float, load: float, warmer: float, disturbed: bool, h: float
 ) -> float:
@@ -167,7 +174,7 @@ def _level(
     return max(float(g * factor), 0.0)
 
 
-@njit(**_FAST)
+@compiled
 def _bent(p: Any, m: Any, v: float, level: float, h: float) -> float:
     """Force [N] of the bristles at the end of the step."""
     before = m[_BENT]
@@ -175,7 +182,7 @@ def _bent(p: Any, m: Any, v: float, level: float, h: float) -> float:
     return float(level * m[_BENT] / p.displacement + p.presliding_damping * (m[_BENT] - before) / h)
 
 
-@njit(**_FAST)
+@compiled
 def _remembered(p: Any, m: Any, before: float, v: float, rest: float, h: float) -> None:
     """What the contact remembers of this step."""
     if abs(v) <= rest:
@@ -189,15 +196,15 @@ def _remembered(p: Any, m: Any, before: float, v: float, rest: float, h: float) 
         m[_GREASE] = (m[_GREASE] + fresh) / (1.0 + fresh + h * p.thixotropy_shear * abs(v))
 
 
-@njit(**_FAST)
+@compiled
 def _within(windows: Any, t: float) -> bool:
+    inside = False
     for j in range(windows.shape[0]):
-        if windows[j, 0] <= t < windows[j, 1]:
-            return True
-    return False
+        inside = inside or windows[j, 0] <= t < windows[j, 1]
+    return inside
 
 
-@njit(**_FAST)
+@compiled
 def run(
     step: Any, model: int, data: int, p: Any, gains: Any, every: float, line: Any, h: float, per: int,
     at: Any, rate: Any, applied: Any, frictionloss: Any, damping: Any, masses: Any,
