@@ -35,6 +35,9 @@ __all__ = ["MUJOCO", "mechanism"]
 
 _LONGEST = 1e-4  # [s]
 _HARDEST = 0.9999  # impedance of a constraint: MuJoCo's limit
+# Damping ratio of an end of the gap: of the speed of an impact at most a quarter over its square is given back, and what a step
+# went too far is made up for within milliseconds.
+_PLASTIC = 4.0
 _USUAL: tuple[float, ...] = (0.0,)
 _FIRST = (0.0, 1.0)
 _EVERY = (
@@ -68,7 +71,7 @@ def _ready() -> None:
 def mechanism(physics: Physics, step: float) -> str:
     """The axis as MuJoCo's XML, with a ``step`` [s]."""
     p, second = physics, ""
-    soft = f"{2.0 * step!r} 1"
+    soft, plastic = f"{2.0 * step!r} 1", f"{2.0 * step!r} {_PLASTIC!r}"
     hard = f"{_HARDEST} {_HARDEST} 1e-3 0.5 1"
     body = p.mass * p.load_share if p.load_share > 0.0 else p.mass
     tendon = ""
@@ -81,7 +84,7 @@ def mechanism(physics: Physics, step: float) -> str:
                 '<joint joint="second" coef="1"/></fixed></tendon>'
             )
         elif p.gap > 0.0:
-            loose = f'limited="true" range="{-half!r} {half!r}" solreflimit="{soft}" solimplimit="{hard}"'
+            loose = f'limited="true" range="{-half!r} {half!r}" solreflimit="{plastic}" solimplimit="{hard}"'
         second = _body("second", p.mass * (1.0 - p.load_share), loose, "")
     elif p.appendage > 0.0:
         rate = 2.0 * math.pi * p.appendage_frequency
@@ -135,7 +138,7 @@ def lead(physics: Physics, controller: Controller, course: Course, resolution: f
     line = np.zeros(round(physics.delay / step) + 1)
     run(
         _step_of(mujoco), model._address, data._address, _numbers(physics), gains, every, line, step, per,
-        data.qpos, data.qvel, data.qfrc_applied, model.dof_frictionloss, model.dof_damping, model.body_mass,
+        data.qpos, data.qvel, data.qfrc_applied, model.dof_frictionloss, model.dof_damping, model.body_mass, model.dof_M0,
         course.reference, course.feedforward, course.load, course.warmer, course.windows, course.noise, out,
     )  # fmt: skip
     return Run(*out)

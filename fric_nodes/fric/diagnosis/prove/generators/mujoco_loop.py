@@ -207,14 +207,14 @@ def _within(windows: Any, t: float) -> bool:
 @compiled
 def run(
     step: Any, model: int, data: int, p: Any, gains: Any, every: float, line: Any, h: float, per: int,
-    at: Any, rate: Any, applied: Any, frictionloss: Any, damping: Any, masses: Any,
+    at: Any, rate: Any, applied: Any, frictionloss: Any, damping: Any, masses: Any, inertia: Any,
     reference: Any, feedforward: Any, load: Any, warmer: Any, windows: Any, noise: Any, out: Any,
 ) -> None:  # fmt: skip
     """Lead MuJoCo's ``model`` and ``data`` (addresses) through a recording of ``per`` steps of ``h`` [s] for each sample."""
     m = np.zeros(14)
     m[_GREASE], m[_CHAIN] = 1.0, at[0]
     n, count, ticks = reference.shape[0], 0, 0
-    before, own = 0.0, masses[1]
+    before, own, alone = 0.0, masses[1], inertia[0]
     rest = _CREEP * h * (p.coulomb + p.stribeck) / masses[1]
     for k in range(n):
         seen, speed = _read(p, at, rate)
@@ -234,7 +234,8 @@ def run(
                 m[_U] = _controlled(gains, m, place + noise[k], speed, wanted, ahead, feedforward[k], every)
                 ticks += 1
             if p.payload_time > 0.0 and t >= p.payload_time:
-                masses[1] = own + p.payload
+                # MuJoCo keeps the inertia of a joint with nothing beyond it ready, and makes the others from the masses.
+                masses[1], inertia[0] = own + p.payload, alone + p.payload
             q, v = at[0], rate[0]
             _remembered(p, m, before, v, rest, h)
             before = v
