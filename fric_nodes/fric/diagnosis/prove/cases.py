@@ -14,6 +14,9 @@ In the variant *dirt* the recordings are written as real machines write them (:m
 In the variant *slow-log* a recording holds every second to eighth sample of the controller, and doesn't say that: what acted
 between two of them nobody knows. Weak effects, whose strength is one beside the noise alone, aren't asked for there.
 
+In the variants *mujoco* and *events* the axis is led by another hand (:mod:`.generators`), under another controller, through
+motions of work in place of those of an experiment; its recordings are dirty, too. Weak effects aren't asked for.
+
 Everything follows from the seed: the same seed gives the same recordings.
 """
 

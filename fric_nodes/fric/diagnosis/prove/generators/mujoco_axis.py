@@ -70,7 +70,7 @@ def _ready() -> None:
 
 def mechanism(physics: Physics, step: float) -> str:
     """The axis as MuJoCo's XML, with a ``step`` [s]."""
-    p, second = physics, ""
+    p, second = physics.using(physics.named()), ""  # plain numbers, as they are to be written
     soft, plastic = f"{2.0 * step!r} 1", f"{2.0 * step!r} {_PLASTIC!r}"
     hard = f"{_HARDEST} {_HARDEST} 1e-3 0.5 1"
     body = p.mass * p.load_share if p.load_share > 0.0 else p.mass
