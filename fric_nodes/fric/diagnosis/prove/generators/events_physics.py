@@ -79,7 +79,8 @@ def numbers(physics: Physics) -> Any:
 @compiled
 def first_state(p: Any, x: Any, mode: Any, place: float) -> None:
     """At rest at ``place``, the contact as young as can be."""
-    x[:] = 0.0
+    for i in range(N_STATES):
+        x[i] = 0.0
     x[_Q] = x[_Y] = place
     x[_GREASE] = 1.0
     x[_LEVEL] = p.coulomb + p.stribeck

@@ -7,6 +7,7 @@ that ends just behind it, so that no error of an interpolation is added.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -72,8 +73,7 @@ def advance(
     """
     k, after, dx = work[:7], work[7], work[8]
     two = p.load_share > 0.0
-    t = begin
-    events = 0
+    t, events = begin, 0
     while True:
         contact, side = margins(p, x, mode, now, t, dx)
         if contact > 0.0 or side > 0.0:
@@ -82,31 +82,32 @@ def advance(
             if events > _TOO_MANY:
                 return CHATTERS
             continue
-        left = end - t
-        if left <= _NEAR:
+        if end - t <= _NEAR:
             return h
-        step = min(h, left, _LONGEST)
-        error = _stepped(p, x, mode, now, t, step, k, after, absolute)
-        if error > 1.0 and step > _LEAST:
-            h = step * max(0.2, 0.9 * error**-0.2)
-            continue
-        whole = step
-        if _ended(p, after, mode, now, t + step, dx):
-            low = 0.0
-            while step - low > _NEAR:
-                middle = 0.5 * (low + step)
-                _stepped(p, x, mode, now, t, middle, k, after, absolute)
-                if _ended(p, after, mode, now, t + middle, dx):
-                    step = middle
-                else:
-                    low = middle
-            _stepped(p, x, mode, now, t, step, k, after, absolute)
+        step = min(h, end - t, _LONGEST)
+        low, high = 0.0, math.inf  # the mode ends between the two
+        while True:
+            error = _stepped(p, x, mode, now, t, step, k, after, absolute)
+            if high == math.inf:
+                if error > 1.0 and step > _LEAST:
+                    step *= max(0.2, 0.9 * error**-0.2)
+                    continue
+                h = max(step * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), _LEAST)
+            if _ended(p, after, mode, now, t + step, dx):
+                high = step
+                if high - low <= _NEAR:
+                    break
+            elif high == math.inf:
+                break
+            else:
+                low = step
+            step = 0.5 * (low + high) if high - low > _NEAR else high
         before = x[3] if two else x[1]
-        x[:] = after
+        for i in range(N_STATES):  # quicker to compile than an assignment of arrays, which may raise
+            x[i] = after[i]
         t += step
         mode[2] = min(max(mode[2], x[0] - p.cable_play), x[0] + p.cable_play)
         turned[0] += step * _way(before, x[3] if two else x[1])
-        h = max(whole * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), _LEAST)
 
 
 @compiled
