@@ -231,6 +231,13 @@ def test_what_a_hand_does_not_honour_it_refuses(hand: Generator) -> None:
     assert not hand.without & {name for order in plan(300, 1, hand.name) for name in order.names}
 
 
+def test_no_delay_is_behind_an_analogue_loop() -> None:
+    analogue = Controller(CONTINUOUS, 0.0, 10.0, 1.0, 0.0, 0.0, 1e9)
+    zeros = np.zeros(10)
+    with pytest.raises(InputError, match="analogue"):
+        GENERATORS["events"].lead(Physics(delay=0.01), analogue, _course(zeros, zeros), 0.0, _H)
+
+
 @each_hand
 def test_a_case_follows_from_its_seed(hand: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     def short(*given: object) -> Setting:

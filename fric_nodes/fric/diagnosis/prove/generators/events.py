@@ -3,7 +3,8 @@
 Events are all that isn't smooth: a body that sticks, breaks away or turns; a motor that meets the load or parts from it; a
 sample of the controller, a delayed command that arrives; a sample of the recording; the edge of a disturbance; a load that
 joins. Between them a Runge-Kutta pair with error control leads the states (:mod:`.events_steps`). No step size stands for
-the physics: sticking is exact, an impact has no duration, and the instants of both are known to 1e-13 s.
+the physics: sticking is exact, an impact has no duration, and the instants of both are known to 1e-13 s. Corners without a
+jump (a limited command, a dead zone, a chain that begins to pull) are no events; the error control takes them in short steps.
 
 The steps are compiled: a recording of 30 s, with some hundred thousand samples of a controller, each an end of smoothness,
 would take minutes with ``scipy.integrate.solve_ivp``, against which a test holds it.
@@ -19,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ....errors import InputError
 from ....record import Array
 from ..course import Course, Run, Unreachable
 from ..physics import Physics
@@ -37,13 +39,13 @@ def lead(physics: Physics, controller: Controller, course: Course, resolution: f
     """What happens to ``physics`` under ``controller`` on ``course``; see :class:`.generator.Generator`.
 
     Raises:
-        InputError: the axis has numbers that this generator doesn't honour.
+        InputError: the axis has numbers that this generator doesn't honour, or a delay behind an analogue loop.
         Unreachable: its events have no end.
     """
     EVENTS.check(physics)
     analogue = controller.kind == CONTINUOUS
     if analogue and physics.delay > 0.0:
-        raise Unreachable("an analogue loop has no line to delay its command in")
+        raise InputError("generator 'events'", "an analogue loop has no line that delays its command", "take a sampled one")
     n = course.reference.shape[0]
     out = np.zeros((5, n))
     gains = np.array(
