@@ -186,4 +186,4 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="cases"):
         plan(0, 1)
     known = {"standard", "form", "half-rate", "double-rate", "mixed", "slow-log", "foreign", "dirt", "compound"}
-    assert set(VARIANTS) == known
+    assert set(VARIANTS) == known | {"mujoco", "events"}

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from fric.diagnosis.prove.course import Course, Run
 from fric.diagnosis.prove.physics import Physics
-from fric.diagnosis.prove.truth import Course, Loop, Run, integrate
+from fric.diagnosis.prove.truth import Loop, integrate
 
 _H = 1e-3
 

@@ -54,7 +54,8 @@ def prove(
             help="standard; form (other laws of the same effects); foreign (laws that fric does not have); half-rate; "
             "double-rate; mixed (effects beside unknown physics); compound (three to five effects at once); "
             "slow-log (only every n-th sample is logged); dirt (coloured noise, mains, interpolation error and jitter in the "
-            "recordings).",
+            "recordings); mujoco (axes simulated by MuJoCo, which needs the extra 'peers') and events (axes simulated from "
+            "event to event), both with other controllers, ordinary motions and dirt.",
         ),
     ] = "standard",
     jobs: Annotated[int | None, typer.Option("--jobs", help="Number of processes. If not given: one per core.")] = None,

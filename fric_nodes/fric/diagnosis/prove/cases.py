@@ -14,6 +14,9 @@ In the variant *dirt* the recordings are written as real machines write them (:m
 In the variant *slow-log* a recording holds every second to eighth sample of the controller, and doesn't say that: what acted
 between two of them nobody knows. Weak effects, whose strength is one beside the noise alone, aren't asked for there.
 
+In the variants *mujoco* and *events* the axis is led by another hand (:mod:`.generators`), under another controller, through
+motions of work in place of those of an experiment; its recordings are dirty, too. Weak effects aren't asked for.
+
 Everything follows from the seed: the same seed gives the same recordings.
 """
 
@@ -30,30 +33,35 @@ import numpy as np
 from ...errors import InputError
 from ...model import Model
 from ...model_file import model_to_text
-from ...record import Array, Record
+from ...record import Record
 from .axis import draw_setting
 from .concealed import CONCEALED, Changes, Concealed, clash
-from .dirt import drawn_dirt
-from .experiment import Bench, Recording, Unreachable, draw_recording, turned
+from .course import Unreachable
+from .excitation import drawn_reference
+from .experiment import Bench, draw_recording, turned
+from .generators import GENERATORS
+from .generators.controllers import drawn_controller
+from .generators.generator import Hand
+from .generators.motions import drawn_motion
 from .outside import OUTSIDE, Outside
 from .physics import Physics
 from .reckoning import CELL, Nominal
 from .structure import nominal_model, relative_errors, true_model
+from .written import dirty, logged, recorded
 
 __all__ = ["KINDS", "VARIANTS", "Case", "Order", "draw", "plan"]
 
 KINDS = ("moderate", "weak", "pair", "unknown", "nothing", "mixed", "compound")
-VARIANTS = ("standard", "form", "half-rate", "double-rate", "mixed", "slow-log", "foreign", "dirt", "compound")
+VARIANTS = ("standard", "form", "half-rate", "double-rate", "mixed", "slow-log", "foreign", "dirt", "compound", *GENERATORS)
 
 _SHARES = {"moderate": 0.32, "weak": 0.16, "pair": 0.16, "unknown": 0.15, "nothing": 0.21}
 _MIXED_SHARES = {"mixed": 0.5, "unknown": 0.5}  # what is found beside something unknown: rightly, and wrongly
 _COMPOUND_SHARES = {"compound": 0.85, "nothing": 0.15}
 _WITHOUT_WEAK = {"moderate": 0.42, "pair": 0.16, "unknown": 0.16, "nothing": 0.26}
 _SHARES_OF = {"mixed": _MIXED_SHARES, "slow-log": _WITHOUT_WEAK, "dirt": _WITHOUT_WEAK, "compound": _COMPOUND_SHARES}
+_SHARES_OF |= dict.fromkeys(GENERATORS, _WITHOUT_WEAK)
 _SEVERAL = (3, 5)  # effects of a compound
 _OVER_FLOOR = 5.0  # times the noise floor, that each of a compound leaves alone at the least
-_EVERY = (2, 8)  # samples of the controller that a slow log holds one of
-_SLOWEST_LOG = 0.02  # [s]
 _RATE = {"half-rate": 0.5, "double-rate": 2.0}
 _NO_AXIS = 100.0  # [%]: where the nominal structure explains nothing, friction has stopped the axis, or it swings
 _MODERATE = (1.0, 15.0)
@@ -122,6 +130,8 @@ def _single_effects(variant: str) -> list[str]:
         found = [(name, each) for name, each in found if each.forms > 1]
     if variant == "foreign":
         found = [(name, each) for name, each in found if each.foreign]
+    if variant in GENERATORS:
+        found = [(name, each) for name, each in found if name not in GENERATORS[variant].without]
     return [name for name, _ in found]
 
 
@@ -131,7 +141,7 @@ def _names(kind: str, count: int, variant: str, random: np.random.Generator) -> 
     if kind == "unknown":
         return [(name,) for name in _balanced(list(OUTSIDE), count, random)]
     if kind == "pair":
-        effects = _single_effects("standard")
+        effects = _single_effects(variant if variant in GENERATORS else "standard")
         pairs = [(a, b) for k, a in enumerate(effects) for b in effects[k + 1 :] if not clash(CONCEALED[a], CONCEALED[b])]
         return [pairs[int(at)] for at in random.permutation(len(pairs))[:count]]
     if kind == "compound":
@@ -237,9 +247,12 @@ def _attempt(order: Order, random: np.random.Generator) -> Case:
     signals |= {name for name in ("normal_load", "temperature") if random.random() < 0.15}
     windows = any(isinstance(each, Outside) and each.windows for each in entries)
     believed = setting.physics.using({"mass": setting.physics.mass * float(random.uniform(0.8, 1.2))})
-    train = draw_recording(setting, believed, setting.train_time, signals, windows, random)
-    validation = draw_recording(setting, believed, setting.validation_time, signals, windows, random)
-    bench = Bench(setting, (train,), validation, setting.resolution)
+    other = GENERATORS.get(order.variant)
+    drawn = drawn_reference if other is None else drawn_motion
+    train = draw_recording(setting, believed, setting.train_time, signals, windows, random, drawn)
+    validation = draw_recording(setting, believed, setting.validation_time, signals, windows, random, drawn)
+    led = None if other is None else Hand(other, drawn_controller(setting, "delay" in order.names, random))
+    bench = Bench(setting, (train,), validation, setting.resolution, led=led)
     bench = bench.with_noise(setting.physics, float(math.exp(random.uniform(math.log(0.02), math.log(0.07)))))
     forms = [_form(each, order.variant, random) if isinstance(each, Concealed) else 0 for each in entries]
     makers = [each.make(setting, random, form) for each, form in zip(entries, forms, strict=True)]
@@ -330,32 +343,15 @@ def _finished(
         "force_noise": bench.force_noise,
         "true_structure": model_to_text(true_model(physics, bench.setting.parts, concealed, conditions)),
     }
-    train = [_record(bench, physics, each, signals, conditions, "train") for each in bench.train]
-    validation = [_record(bench, physics, bench.validation, signals, conditions, "validation")]
-    if order.variant == "dirt":
-        dirt = drawn_dirt(bench.setting.friction, bench.setting.travel, bench.resolution, random)
-        key["dirt"] = asdict(dirt)
-        seeds = iter(random.integers(1, 2**31, len(train) + 1).tolist())
-        train, validation = ([dirt.on(each, next(seeds)) for each in held] for held in (train, validation))
+    if isinstance(bench.led, Hand):
+        key["controller"] = asdict(bench.led.controller)
+    written = [recorded(bench, physics, each, signals, conditions, "train") for each in bench.train]
+    written.append(recorded(bench, physics, bench.validation, signals, conditions, "validation"))
+    if order.variant == "dirt" or order.variant in GENERATORS:
+        written = dirty(written, bench, key, random)
     if order.variant == "slow-log":
-        most = min(_EVERY[1], int(_SLOWEST_LOG / bench.setting.sample_time))
-        every = int(random.integers(_EVERY[0], most + 1))
-        key["every"] = every
-        train, validation = ([_logged(each, every) for each in held] for held in (train, validation))
-    return Case(tuple(train), tuple(validation), given, key)
-
-
-def _logged(record: Record, every: int) -> Record:
-    """One of so many samples of ``record``, by a log that doesn't know how the force is held."""
-    extra = {name: signal[::every] for name, signal in record.extra.items()}
-    return replace(
-        record,
-        time=record.time[::every],
-        position=record.position[::every],
-        effort=record.effort[::every],
-        extra=extra,
-        effort_hold="linear",
-    )
+        written = logged(written, bench, key, random)
+    return Case(tuple(written[:-1]), tuple(written[-1:]), given, key)
 
 
 def _check(kind: str, noe: float, floor: float, alone: Sequence[float]) -> None:
@@ -372,24 +368,3 @@ def _check(kind: str, noe: float, floor: float, alone: Sequence[float]) -> None:
         raise Unreachable(f"only {noe / floor:.3g} times the floor")
     if kind in ("moderate", "unknown") and not _MODERATE[0] <= noe <= _MODERATE[1]:
         raise Unreachable(f"an NOE of {noe:.3g} %")
-
-
-def _record(
-    bench: Bench, physics: Physics, recording: Recording, signals: frozenset[str], conditions: Mapping[str, float], name: str
-) -> Record:
-    found = bench.run(physics, recording)
-    n = found.command.shape[0]
-    extra: dict[str, Array] = {}
-    if "normal_load" in signals:
-        extra["normal_load"] = conditions["normal_load"] * recording.course.load
-    if "temperature" in signals:
-        extra["temperature"] = np.round(conditions["temperature"] + recording.course.warmer, 2)
-    return Record(
-        time=np.round(np.arange(n) * bench.setting.sample_time, 9),
-        position=found.measured,
-        effort=found.command + bench.noise(recording),
-        extra=extra,
-        nominal=dict(conditions),
-        source=name,
-        effort_hold="following",
-    )

@@ -21,6 +21,7 @@ from ...files import write_text
 from ...threads import alone
 from .candidate import DIAGNOSE, entered, examine, own_fit
 from .cases import Order, plan
+from .generators import GENERATORS
 from .scoring import Outcome, Score, outcome_of, scored
 from .sealing import case_folder, open_key, published, seal, set_up
 
@@ -69,6 +70,8 @@ def hold(
     orders = plan(n_cases, seed, variant)
     workers = _workers(jobs)
     entered(entry)  # before anything is drawn
+    if variant in GENERATORS:
+        GENERATORS[variant].ready()
     _claim(out, orders)
     hash_of_key = published(out)
     if hash_of_key is None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...record import Array
 
-__all__ = ["Axis", "drawn_reference"]
+__all__ = ["Axis", "Piece", "drawn_reference"]
 
 _ACCELERATION_TIME = 0.12  # of a move's ends [s] at the least
 

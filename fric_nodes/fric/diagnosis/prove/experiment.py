@@ -15,22 +15,19 @@ import numpy as np
 
 from ...record import Array
 from .axis import Setting
-from .excitation import drawn_reference
+from .course import Course, Run, Unreachable
+from .excitation import Axis, Piece, drawn_reference
 from .physics import Physics
 from .reckoning import Nominal, Remainder, balance, floor_of, refit
-from .truth import Course, Loop, Run, integrate
+from .truth import Loop, integrate
 
-__all__ = ["Bench", "Recording", "Unreachable", "draw_recording"]
+__all__ = ["Bench", "Recording", "draw_recording"]
 
 _TRIALS = 9
 _KEPT = 4
 _WARM = 9.0  # [K], usual deviation of the temperature
 _LOADED = 0.3  # usual relative deviation of the normal load
 _SHARE_OF_ENCODER = 0.3  # of the noise floor
-
-
-class Unreachable(Exception):
-    """This axis can't show the effect with the strength wanted; another one is drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +46,12 @@ class Recording:
 
 
 def draw_recording(
-    setting: Setting, known: Physics, duration: float, signals: frozenset[str], windows: bool, random: np.random.Generator
-) -> Recording:
-    """A recording of ``duration`` [s] whose feedforward believes the physics ``known``."""
+    setting: Setting, known: Physics, duration: float, signals: frozenset[str], windows: bool, random: np.random.Generator,
+    drawn: Callable[[Axis, float, np.random.Generator], Piece] = drawn_reference,
+) -> Recording:  # fmt: skip
+    """A recording of ``duration`` [s] whose feedforward believes the physics ``known``; its motions are ``drawn``."""
     h = setting.sample_time
-    reference, push = drawn_reference(setting.axis(setting.friction), duration, random)
+    reference, push = drawn(setting.axis(setting.friction), duration, random)
     n = reference.shape[0]
     t = np.arange(n, dtype=np.float64) * h
     rate = np.gradient(reference, h)
@@ -86,6 +84,8 @@ class Bench:
         validation: the recording held back.
         resolution: of the encoder [m].
         force_noise: standard deviation [N].
+        led: another hand that leads the axis, from physics, course, step of the encoder [m] and sampling time [s]; the usual
+            loop if None.
     """
 
     setting: Setting
@@ -93,6 +93,7 @@ class Bench:
     validation: Recording
     resolution: float
     force_noise: float = 0.0
+    led: Callable[[Physics, Course, float, float], Run] | None = None
     _kept: dict[tuple[Physics, int], Run] = field(default_factory=dict, init=False, repr=False)
 
     def run(self, physics: Physics, recording: Recording) -> Run:
@@ -105,18 +106,23 @@ class Bench:
         return self._kept[key]
 
     def _new_run(self, physics: Physics, recording: Recording) -> Run:
-        at = self.setting
-        proportional = at.physics.mass * at.bandwidth**2
-        usual = at.friction + at.physics.mass * at.acceleration
-        loop = Loop(proportional, 1.6 * at.physics.mass * at.bandwidth, 20.0 * usual, at.sample_time, self.resolution)
         if physics.payload_time > 0.0:
             physics = physics.using({"payload_time": physics.payload_time + recording.shift})
-        found = integrate(physics, loop, recording.course)
-        if not np.all(np.isfinite(found.command)) or not np.ptp(found.seen) <= 3.0 * at.travel:
+        if self.led is None:
+            found = integrate(physics, self._loop(), recording.course)
+        else:
+            found = self.led(physics, recording.course, self.resolution, self.setting.sample_time)
+        if not np.all(np.isfinite(found.command)) or not np.ptp(found.seen) <= 3.0 * self.setting.travel:
             raise Unreachable("the axis escapes")
         if np.quantile(np.abs(np.diff(found.seen)), 0.99) == 0.0:
             raise Unreachable("the axis hardly moves")
         return found
+
+    def _loop(self) -> Loop:
+        at = self.setting
+        proportional = at.physics.mass * at.bandwidth**2
+        usual = at.friction + at.physics.mass * at.acceleration
+        return Loop(proportional, 1.6 * at.physics.mass * at.bandwidth, 20.0 * usual, at.sample_time, self.resolution)
 
     def noise(self, recording: Recording) -> Array:
         """Of the recording's force signal [N]."""

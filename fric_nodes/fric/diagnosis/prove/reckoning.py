@@ -26,7 +26,7 @@ from scipy.optimize import lsq_linear, minimize_scalar
 from scipy.signal import butter, sosfiltfilt
 
 from ...record import Array, Index, Mask
-from .truth import Run
+from .course import Run
 
 __all__ = ["CELL", "Balance", "Nominal", "balance", "floor_of", "refit"]
 

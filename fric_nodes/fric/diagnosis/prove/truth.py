@@ -23,38 +23,17 @@ from typing import Any
 
 import numpy as np
 
-from ...record import Array
 from .chain import N_STATES, begin, encoder, stepped
+from .course import Course, Run
 from .laws import compiled_loop
 from .physics import FIELDS, Physics
 
-__all__ = ["Course", "Loop", "Run", "integrate"]
+__all__ = ["Loop", "integrate"]
 
 _FINEST = 25  # steps per sample at least
 _LONGEST = 2e-5  # [s]
 
 Numbers: Any = namedtuple("Numbers", FIELDS)  # type: ignore[misc]
-
-
-@dataclass(frozen=True, eq=False)
-class Course:
-    """What one run is led by; arrays of shape ``(n_samples,)``.
-
-    Attributes:
-        reference: position wanted [m].
-        feedforward: force added to the controller's [N].
-        load: relative normal load [1].
-        warmer: temperature less nominal [K].
-        windows: spans in which a disturbance acts [s], shape ``(n, 2)``.
-        noise: added to the position before the encoder rounds it [m].
-    """
-
-    reference: Array
-    feedforward: Array
-    load: Array
-    warmer: Array
-    windows: Array
-    noise: Array
 
 
 @dataclass(frozen=True)
@@ -66,25 +45,6 @@ class Loop:
     largest: float
     sample_time: float
     resolution: float
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """What happened; arrays of shape ``(n_samples,)``.
-
-    Attributes:
-        command: of the controller, held from its sample to the next [N].
-        measured: what the encoder says [m].
-        seen: the encoder without noise and rounding [m].
-        speed: rate of ``seen`` [m/s].
-        direction: mean sign of the seen velocity until the next sample; between -1 and 1.
-    """
-
-    command: Array
-    measured: Array
-    seen: Array
-    speed: Array
-    direction: Array
 
 
 def integrate(physics: Physics, loop: Loop, course: Course) -> Run:
