@@ -19,7 +19,6 @@ __all__ = ["FORMAT", "Calibration", "Evidence", "calibration", "measures_of"]
 
 FORMAT = "fric-calibration/1"
 _LEAST = 1e-3  # numerical: of a share, whose logarithm is taken
-_PLENTY = 1e4  # numerical, nats: of evidence, beyond which nothing is surer
 _MARGIN = 7.0  # numerical: a rival that leaves a thousand times more is out
 _SURE = 12.0  # numerical: logarithm of odds, beyond which nothing is surer
 
@@ -68,7 +67,7 @@ def measures_of(evidence: Evidence) -> dict[str, float]:
 
 def _signed(nats: float) -> float:
     """The order of magnitude of evidence, with its sign."""
-    return math.copysign(math.log1p(min(abs(nats), _PLENTY)), nats)
+    return math.copysign(min(math.log1p(abs(nats)), _SURE), nats)
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,6 @@ from .track import Track
 
 __all__ = ["Presence", "presences"]
 
-_ITERATIONS = 6  # numerical: from where everything fits
-
 
 @dataclass(frozen=True)
 class Presence:
@@ -59,7 +57,7 @@ def presences(
     """
     if not steps:
         return {}
-    state = refit(track, end, _ITERATIONS)
+    state = refit(track, end)
     independent = independent_values(track, state.fit.residual)
     judged = Halves(track, state)
     found: dict[str, Presence] = {}

@@ -39,7 +39,6 @@ _PLAUSIBLE = 0.3  # probability among the laws of its component
 _ROUNDS = 6  # numerical: in each at least one term comes
 _ROUNDS_BESIDE = 3  # numerical: what comes later mends what the first has taken for something else
 _TO_WEIGH = 8  # numerical, iterations from where everything fits
-_AT_ONCE = 20  # numerical, iterations from where nothing fits
 
 
 def middle_of(tracks: Sequence[Track]) -> Track:
@@ -87,7 +86,8 @@ def _fitted(track: Track, state: State, offered: Sequence[Form], tell: Callable[
     others come to what it has come to, twice as many each time; beside that, all are fitted at once.
     """
     tell("trying together: " + ", ".join(f"{each.term.effect.title} ({each.nats:.0f} nats)" for each in offered))
-    fitted = [refit(track, state.fit.model.with_terms((*state.fit.model.terms, *(each.term for each in offered))), _AT_ONCE)]
+    everything = state.fit.model.with_terms((*state.fit.model.terms, *(each.term for each in offered)))
+    fitted = [refit(track, everything, max_iterations=20)]
     model, there = state.fit.model, 0
     while len(offered) > 1 and there < len(offered):
         coming = offered[there : max(2 * there, 1)]
