@@ -8,7 +8,7 @@ to stand out from, and what a candidate gains on a twin it gains by chance.
 
 from __future__ import annotations
 
-import math
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -27,6 +27,7 @@ _LED = 4.0  # times the observer's bandwidth: of the spring that leads it; with 
 # Spring and damper act once per sample: what they may be at most, times m/h^2 and m/h of the body that the sensor sees. That
 # is a part of the whole where there is play: the whole's spring would make it swing between the stops, wider each time.
 _STIFFEST, _MOST_DAMPING = 0.15, 0.6
+_SPEEDS, _FEWEST = 8, 250  # statistical: ranges of speed at most, and samples of each
 
 
 def _led(track: Track, model: Model, k: int) -> tuple[Array, Array, Array]:
@@ -60,16 +61,31 @@ def twins(track: Track, model: Model, n_twins: int, seed: int = 1) -> list[Twin]
     """``n_twins`` recordings that ``model`` would have left, each with noise of its own."""
     led = [_led(track, model, k) for k in range(len(track.runs))]
     random = np.random.default_rng(seed)
-    return [_noisy(track.runs, led, random) for _ in range(n_twins)]
+    own = [_sensor_noise(run, motion.velocity) for run, motion in zip(track.runs, track.motion, strict=True)]
+    return [_noisy(track.runs, led, own, random) for _ in range(n_twins)]
 
 
-def _noisy(runs: Sequence[Run], led: Sequence[tuple[Array, Array, Array]], random: np.random.Generator) -> Twin:
+def _sensor_noise(run: Run, velocity: Array) -> Array:
+    """Standard deviation of the sensor's own noise at each sample [x], which the steps of the encoder don't explain, ``(n,)``.
+
+    A position that is read a little early or late is wrong in proportion to the speed, and so is one within the lines of an
+    encoder. So it is told for ranges of speed that hold equally many samples.
+    """
+    n, step = run.position.shape[0], step_of(run.position)
+    speed = np.abs(velocity)
+    edges = np.quantile(speed, np.linspace(0.0, 1.0, 1 + max(min(_SPEEDS, n // _FEWEST), 1)))
+    noise = np.array([noise_of(run.position, (speed >= low) & (speed <= high)) for low, high in itertools.pairwise(edges)])
+    variance = np.interp(speed, 0.5 * (edges[1:] + edges[:-1]), noise**2)
+    return np.asarray(np.sqrt(np.maximum(variance - step**2 / 12.0, 0.0)))
+
+
+def _noisy(
+    runs: Sequence[Run], led: Sequence[tuple[Array, Array, Array]], owns: Sequence[Array], random: np.random.Generator
+) -> Twin:
     efforts, positions = [], []
-    for run, (there, _, given) in zip(runs, led, strict=True):
+    for run, (there, _, given), own in zip(runs, led, owns, strict=True):
         efforts.append(given + run.force_noise(random) + run.between * random.standard_normal(given.shape[0]))
         step = step_of(run.position)
-        # What the steps of the encoder don't explain of the noise is the sensor's own.
-        own = math.sqrt(max(noise_of(run.position) ** 2 - step**2 / 12.0, 0.0))
         # A model that escapes, however it is led, has a twin that runs away: far enough to be told, not beyond all numbers.
         low, high = float(np.min(run.position)), float(np.max(run.position))
         reach = _ESCAPED * (high - low)

@@ -15,7 +15,7 @@ import math
 import numpy as np
 from scipy.special import comb
 
-from ..record import Array
+from ..record import Array, Mask
 
 __all__ = ["noise_of", "step_of"]
 
@@ -51,9 +51,17 @@ def step_of(values: Array) -> float:
         reach *= _SHARPENED
 
 
-def noise_of(signal: Array) -> float:
-    """Standard deviation of the white noise of ``signal``, shape ``(n,)``, in its unit, from sixth differences."""
+def noise_of(signal: Array, where: Mask | None = None) -> float:
+    """Standard deviation of the white noise of ``signal``, shape ``(n,)``, in its unit, from sixth differences.
+
+    Args:
+        signal: all of it.
+        where: True for the samples of which it is told, shape ``(n,)``; None: for all.
+    """
     if signal.shape[0] <= _DIFFERENCES:
         return 0.0
     gain = math.sqrt(float(comb(2 * _DIFFERENCES, _DIFFERENCES)))
-    return float(np.median(np.abs(np.diff(signal, _DIFFERENCES)))) / (0.6745 * gain)
+    sizes = np.abs(np.diff(signal, _DIFFERENCES))
+    if where is not None:
+        sizes = sizes[where[_DIFFERENCES // 2 : -_DIFFERENCES // 2]]
+    return float(np.median(sizes)) / (0.6745 * gain) if sizes.size else 0.0
