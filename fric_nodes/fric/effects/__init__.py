@@ -5,6 +5,9 @@ A new effect is one new module with a constant ``EFFECT``, and its test. Nothing
 
 from __future__ import annotations
 
+import copyreg
+from typing import Any
+
 from ..effect import Effect
 from ..registry import discover
 
@@ -20,3 +23,15 @@ def by_name(effect: str, law: str = "") -> Effect | None:
         return EFFECTS.get(f"{effect}/{law}")
     laws = [found for found in EFFECTS.values() if found.id == effect]
     return next((found for found in laws if found.usual), laws[0] if laws else None)
+
+
+def _known(key: str) -> Effect:
+    return EFFECTS[key]
+
+
+def _pickled(effect: Effect) -> tuple[Any, ...]:
+    """An effect of the catalogue goes to another process by its key: there is one of each, and its functions are not copied."""
+    return (_known, (effect.key,)) if EFFECTS.get(effect.key) is effect else object.__reduce_ex__(effect, 2)  # type: ignore[return-value]
+
+
+copyreg.pickle(Effect, _pickled)
