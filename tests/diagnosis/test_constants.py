@@ -7,7 +7,7 @@ from pathlib import Path
 
 import fric.diagnosis
 
-MOST = 270
+MOST = 271
 """What there are now; a change that takes some away lowers it."""
 
 

@@ -115,7 +115,7 @@ def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None])
 
     On a real machine many small effects may add up to what is left. None of them explains it, so that the verdict stays
     "unknown". Each has to help beside flexible functions of all other components. All together have to lower what is left on
-    the half of the recordings that was not fitted.
+    the half of the recordings that was not fitted, or on blocks left out in turn.
 
     Args:
         tracks: those that ``growth`` was grown on.
@@ -139,8 +139,8 @@ def helped(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], None])
     if not more:
         return growth
     rest = audit(track, start.begin.fit.model, end.fit.model)
-    if rest >= start.rest:
-        return growth
+    if rest >= start.rest and end.left >= start.end.left:
+        return growth  # a half tells a run-in badly; blocks that are left out in turn tell it
     kept = {held.effect.key for held in end.fit.model.terms}
     steps = tuple(step for step in start.steps if step.term in end.fit.model.prefixes)
     gone = tuple(
