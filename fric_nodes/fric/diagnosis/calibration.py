@@ -50,13 +50,11 @@ class Evidence:
 def measures_of(evidence: Evidence) -> dict[str, float]:
     """The measures that enter the odds, by name; each counts for the effect, the more the larger it is.
 
-    What stays unexplained is held against the effect's own part: a large effect is no less there for what others leave, and a
-    small one no more for what a large one explains. Halves or functions that speak against an effect count against it.
+    How much stays unexplained is no measure, beyond whether the effects are an explanation: it hardly told right from wrong in
+    examinations beside the others. Halves or functions that speak against an effect count against it.
     """
-    share = min(max(evidence.share, _LEAST), 1.0)
     return {
-        "share": math.log(share),
-        "share over rest": math.log(share / min(max(evidence.rest, _LEAST * share), 1.0)),
+        "share": math.log(min(max(evidence.share, _LEAST), 1.0)),
         "halves": _signed(evidence.halves),
         "functions": _signed(evidence.functions),
         "rivals": math.log(min(max(evidence.rivals, _LEAST), 1.0)),
