@@ -41,9 +41,7 @@ def test_the_published_map_says_what_it_was_learnt_from() -> None:
 def test_what_findings_were_drawn_from_is_learnt_and_calibrated() -> None:
     """Findings whose truth follows a known map: what is learnt from one half is as sure as the other half is right."""
     random = np.random.default_rng(5)
-    true = Calibration(
-        -3.0, {**dict.fromkeys(measures_of(PLAIN), 0.0), "halves": 1.0, "share": 0.7}, {"ripple": -1.5}
-    )
+    true = Calibration(-3.0, {**dict.fromkeys(measures_of(PLAIN), 0.0), "halves": 1.0, "share": 0.7}, {"ripple": -1.5})
     trials = []
     for _ in range(3000):
         effect = str(random.choice(["stribeck", "ripple"]))
