@@ -132,6 +132,7 @@ def test_other_laws_take_over_what_means_the_same() -> None:
     assert peak.values == (0.5, 0.1, 0.02, 1.0)
 
 
+@pytest.mark.long
 def test_the_command_holds_blocks_of_one_recording_back(tmp_path: Path) -> None:
     bag = write_record(strokes(60.0, True, 7), tmp_path / "bag")
     write_model(nominal(), tmp_path / "nominal.yaml")

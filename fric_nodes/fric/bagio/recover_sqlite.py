@@ -34,9 +34,10 @@ _FORMATS = {"ros2msg": MessageDefinitionFormat.MSG, "ros2idl": MessageDefinition
 def has_journal(path: Path) -> bool:
     """True when a journal with content lies beside the database: its recorder did not close it, or is still at work."""
     for suffix in ("-journal", "-wal"):
-        journal = path.with_name(path.name + suffix)
-        if journal.is_file() and journal.stat().st_size:
-            return True
+        # A recorder at work may take its journal away at any time.
+        with suppress(FileNotFoundError):
+            if path.with_name(path.name + suffix).stat().st_size:
+                return True
     return False
 
 
@@ -64,9 +65,8 @@ class SqliteScan:
             copy = Path(self._folder.name) / "bag.db3"
             shutil.copyfile(path, copy)
             for suffix in _JOURNALS:
-                beside = path.with_name(path.name + suffix)
-                if beside.is_file():
-                    shutil.copyfile(beside, copy.with_name(copy.name + suffix))
+                with suppress(FileNotFoundError):
+                    shutil.copyfile(path.with_name(path.name + suffix), copy.with_name(copy.name + suffix))
             if not has_journal(path):
                 _fit_header(copy)
             self._size = copy.stat().st_size
