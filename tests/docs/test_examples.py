@@ -58,6 +58,7 @@ def test_the_readme_s_python_runs_as_printed(tmp_path: Path) -> None:
     assert (tmp_path / "report.html").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_the_tutorial_leads_to_a_compensated_axis(tmp_path: Path) -> None:
     printed = _walk("docs/tutorial.md", tmp_path, (_INSTALLATION, "fric diagnose"))
     # The errors that the page promises.
