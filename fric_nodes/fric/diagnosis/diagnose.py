@@ -24,8 +24,10 @@ from .at_once import by_parts, helped, surpassing, together
 from .blocks import one_sided
 from .by_means import concluded_by_means
 from .conclusion import concluded
+from .contradiction import contradiction_of, without_stand_ins
 from .deadline import is_over, within
 from .excerpt import confirmed, excerpt
+from .findings import contradicted
 from .fitting import best_track
 from .grow import first_terms, grow, leaves_much, with_moves
 from .growth import Growth
@@ -115,9 +117,14 @@ def _diagnosed(train: Sequence[Record], validation: Sequence[Record], nominal: M
         tell("fitting what was found to all samples")
         growth, note = confirmed(parts, growth)
         corrected.append(note)
+    contradiction = contradiction_of(growth, train)
     tell("judging on the validation recordings")
+    if contradiction is not None:
+        growth = without_stand_ins(growth, contradiction)
     found = concluded(train, validation, nominal, checks, corrected, tracks, searched, growth)
-    if any(each.effect == "unknown" for each in found.findings):
+    if contradiction is not None:
+        found = contradicted(found, contradiction)
+    elif any(each.effect == "unknown" for each in found.findings):
         tell("weighing what is left by the components of the machine")
         found = replace(found, components=by_component(searched, found.model))
     return _with_inertia(found, nominal, train) if massless else found

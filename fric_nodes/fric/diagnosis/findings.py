@@ -12,6 +12,7 @@ from ..model import Model, Term
 from .candidates import FRICTION, Scales, candidates, place_of
 from .component import Signature, agreed, signatures
 from .confidence import MANY, confidence_of, unknown_confidence
+from .contradiction import Contradiction
 from .fitting import refit
 from .growth import Growth
 from .held_back import OnlyThere
@@ -19,6 +20,7 @@ from .judging import HARDLY, difference_of
 from .locate import Where, locate
 from .presence import Presence
 from .result import (
+    Diagnosis,
     Estimate,
     Finding,
     Rejected,
@@ -33,6 +35,7 @@ from .start import FIRST_FIT
 from .track import Track
 
 __all__ = [
+    "contradicted",
     "finding_of",
     "next_experiment",
     "rejected_effects",
@@ -192,6 +195,41 @@ def unknown_finding(
             f"{100 * rest:.3g} %"
         )
     return _by_none("something that no known effect explains", where, likely, best, rest, evidence, scored)
+
+
+def contradicted(found: Diagnosis, contradiction: Contradiction) -> Diagnosis:
+    """``found``, where the recordings learnt from contradict each other: that is no effect, and leaves none of them sure."""
+    first = contradiction.differs[0]
+    first_sentence = contradiction.sentence.removesuffix(".")
+    explains = f"values of their own in each recording explain {percent(contradiction.share)} % of the missing force's energy"
+    rest = [each for each in found.findings if each.effect != "unknown"]
+    where = next((each.where for each in found.findings), found.where) or Where((), 0.0, "everywhere", "", (0.0, 0.0), 1.0)
+    unknown = Finding(
+        effect="unknown",
+        law="",
+        title="recordings that contradict each other",
+        confidence=unknown_confidence(contradiction.share, found.validation.stands_out),
+        runner_up=None,
+        where=where,
+        component=first.component,
+        share=contradiction.share,
+        evidence=f"{first_sentence}; {explains}, all effects that grew {percent(max(contradiction.by_effects, 0.0))} %",
+        parameters={},
+        noe_before=found.validation.noe_refit,
+        noe_after=found.validation.noe_augmented,
+    )
+    number, source = first.recording
+    return replace(
+        found,
+        mismatch=True,
+        findings=(unknown, *(replace(each, confidence=min(each.confidence, _UNDECIDED)) for each in rest)),
+        next_experiment=(
+            f"make recording {number} ({source}) again under the conditions of the others, or diagnose it by itself, with the "
+            "model of its own load, lubricant and sensor"
+        ),
+        notes=(*found.notes, f"{contradiction.sentence} One model can't hold for all of them; its values are averages."),
+        contradiction=contradiction,
+    )
 
 
 def unlearnt_finding(where: Where, alone: OnlyThere, scored: Validation) -> Finding:

@@ -17,7 +17,7 @@ from ..identification.gauss_newton import Solution, minimise
 from ..model import Model
 from ..record import Array
 
-__all__ = ["Bounds", "Fit", "fitted_values"]
+__all__ = ["Bounds", "Fit", "fitted_values", "limits_of"]
 
 Bounds = dict[str, tuple[float, float]]
 """Least and largest value of parameters by their names, in their units."""
@@ -66,12 +66,7 @@ def fitted_values(
         how: tolerances and limits of :func:`fric.identification.gauss_newton.minimise`.
     """
     index = np.array([model.names.index(name) for name in names], dtype=np.int64)
-    declared = [parameter.declaration for parameter in model.parameters()]
-    lower, upper = np.empty(index.shape[0]), np.empty(index.shape[0])
-    for k, name in enumerate(names):
-        p = declared[index[k]]
-        low, high = bounds.get(name, (-np.inf, np.inf))
-        lower[k], upper[k] = max(p.lower, low, _TINY * scale[k] if p.positive else -np.inf), min(p.upper, high)
+    lower, upper = limits_of(model, names, scale, bounds)
     values = model.values
 
     def at(point: Array) -> Model:
@@ -79,5 +74,17 @@ def fitted_values(
         trial[index] = point * scale
         return model.with_values(trial)
 
-    answer = minimise(lambda point: residual(at(point)), values[index] / scale, lower / scale, upper / scale, **how)
+    answer = minimise(lambda point: residual(at(point)), values[index] / scale, lower, upper, **how)
     return at(answer.point), answer
+
+
+def limits_of(model: Model, names: Sequence[str], scale: Array, bounds: Bounds) -> tuple[Array, Array]:
+    """Least and largest value of the parameters ``names`` in units of ``scale``, shape ``(n_names,)`` each."""
+    index = [model.names.index(name) for name in names]
+    declared = [parameter.declaration for parameter in model.parameters()]
+    lower, upper = np.empty(len(index)), np.empty(len(index))
+    for k, name in enumerate(names):
+        p = declared[index[k]]
+        low, high = bounds.get(name, (-np.inf, np.inf))
+        lower[k], upper[k] = max(p.lower, low, _TINY * scale[k] if p.positive else -np.inf), min(p.upper, high)
+    return lower / scale, upper / scale

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -59,6 +60,11 @@ class Limit:
     softer: bool
     unit: str
     why: str
+
+    def as_json(self) -> dict[str, Any]:
+        """As ``report.json`` has it."""
+        names = ("effect", "parameter", "size", "softer", "unit", "why")
+        return {name: getattr(self, name) for name in names}
 
     @property
     def sentence(self) -> str:

@@ -15,6 +15,7 @@ from ..record import Array
 from .additive.told import ComponentFinding
 from .calibration import Evidence
 from .confidence import AS_LIKELY, FAINT
+from .contradiction import Contradiction
 from .halves import Half
 from .limits import Limit
 from .locate import Where
@@ -181,6 +182,7 @@ class Diagnosis:
         limits: of every effect that was not found, the smallest that would have shown in the recordings learnt from.
         fitted_on: sources of the recordings learnt from.
         tested_on: of those held back.
+        contradiction: how the recordings learnt from contradict each other; None where they don't.
     """
 
     mismatch: bool
@@ -205,6 +207,7 @@ class Diagnosis:
     limits: tuple[Limit, ...] = ()
     fitted_on: tuple[str, ...] = ()
     tested_on: tuple[str, ...] = ()
+    contradiction: Contradiction | None = None
 
     @property
     def limits_in_words(self) -> str:
@@ -216,6 +219,8 @@ class Diagnosis:
     def sentence(self) -> str:
         """The verdict in one sentence."""
         v = self.validation
+        if self.contradiction is not None:
+            return self.contradiction.sentence
         if not self.mismatch and self.by_means:
             return (
                 f"No term of the friction curve is missing: the refitted one leaves an NOE of {v.noe_refit:.3g} % of the "
@@ -313,17 +318,8 @@ class Diagnosis:
                 "where": _where(self.unexplained.where),
                 "components": {each.component: each.share for each in self.components if each.is_there},
             },
-            "limits": [
-                {
-                    "effect": each.effect,
-                    "parameter": each.parameter,
-                    "size": each.size,
-                    "softer": each.softer,
-                    "unit": each.unit,
-                    "why": each.why,
-                }
-                for each in self.limits
-            ],
+            "limits": [each.as_json() for each in self.limits],
+            "contradiction": None if self.contradiction is None else self.contradiction.as_json(),
             "data": {
                 "fitted": list(self.fitted_on),
                 "selected": "blocks and halves of the fitted recordings, each left out in turn",
