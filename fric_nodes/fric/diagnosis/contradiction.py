@@ -15,8 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,101 +24,15 @@ from ..record import Array, Record
 from .additive.residual import independent_values
 from .candidates import place_of
 from .confidence import UNEXPLAINED
+from .differences import Contradiction, Told
 from .fitting import NOTHING, State
 from .growth import Growth
+from .judging import most_left
 from .limits import EVIDENCE
 from .own_values import GAIN, Differing, Own
 from .price import OF_EXCESS, OF_FLOOR, PER_PARAMETER
 
-__all__ = ["Contradiction", "Told", "contradiction_of", "without_stand_ins"]
-
-
-@dataclass(frozen=True)
-class Told:
-    """A parameter whose value differs between recordings.
-
-    Attributes:
-        parameter: its name in the model, or that of the gain of the force.
-        unit: of the values.
-        component: part of the machine.
-        recording: number, from 1, and source of the one that differs most from the others.
-        value: there.
-        others: mean of the values in the others, each weighted by how well it is known.
-        difference: between the two.
-        std: standard error of the difference.
-        interval: of the difference, 95 %.
-        values: source, value and standard error in each recording.
-    """
-
-    parameter: str
-    unit: str
-    component: str
-    recording: tuple[int, str]
-    value: float
-    others: float
-    difference: float
-    std: float
-    interval: tuple[float, float]
-    values: tuple[tuple[str, float, float], ...]
-
-    @property
-    def phrase(self) -> str:
-        """Values and difference in words."""
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        number, source = self.recording
-        digits = max(1 - math.floor(math.log10(max(self.std, 1e-300))), 0)  # two of the standard error
-        low, high = self.interval
-        return (
-            f"{self.parameter} is {self.value:.4g}{unit} in recording {number} ({source}) and {self.others:.4g}{unit} in the "
-            f"other{'s' if len(self.values) > 2 else ''}, a difference of {self.difference:+.{digits}f} ± "
-            f"{self.std:.{digits}f}{unit} (95 %: {low:+.{digits}f} to {high:+.{digits}f})"
-        )
-
-    def as_json(self) -> dict[str, Any]:
-        """As ``report.json`` has it."""
-        return {
-            "parameter": self.parameter,
-            "unit": self.unit,
-            "recording": {"number": self.recording[0], "source": self.recording[1]},
-            "value": self.value,
-            "others": self.others,
-            "difference": self.difference,
-            "std": self.std,
-            "interval": list(self.interval),
-            "values": [{"source": source, "value": value, "std": std} for source, value, std in self.values],
-        }
-
-
-@dataclass(frozen=True)
-class Contradiction:
-    """How recordings contradict each other.
-
-    Attributes:
-        differs: parameters with values of their own in each recording, what explains most first.
-        share: of what is missing that this explains.
-        by_effects: the share that all effects that grew explain.
-        beside: True where some of what is missing takes these effects as well.
-    """
-
-    differs: tuple[Told, ...]
-    share: float
-    by_effects: float
-    beside: bool
-
-    @property
-    def sentence(self) -> str:
-        """In one sentence."""
-        return f"The recordings learnt from contradict each other: {'; '.join(each.phrase for each in self.differs)}."
-
-    def as_json(self) -> dict[str, Any]:
-        """As ``report.json`` has it."""
-        return {
-            "sentence": self.sentence,
-            "differs": [each.as_json() for each in self.differs],
-            "share": self.share,
-            "share_of_effects": self.by_effects,
-            "beside_effects": self.beside,
-        }
+__all__ = ["contradiction_of", "without_stand_ins"]
 
 
 def contradiction_of(growth: Growth, train: Sequence[Record]) -> Contradiction | None:
@@ -134,6 +47,9 @@ def contradiction_of(growth: Growth, train: Sequence[Record]) -> Contradiction |
             # Effects that are there besides have their price.
             n_more = len(own.model.values) - len(begin.fit.model.values) + own.n_additional
             left = max(own.left() - begin.floor, 0.0)
+            # Recordings at other speeds or places tell other averages of physics that has no name here, too.
+            if left > begin.excess * most_left(growth if state is end else replace(growth, steps=())):
+                continue
             tried.append((left + PER_PARAMETER * n_more * begin.excess, left, state is not begin, own))
     if not tried:
         return None
@@ -161,15 +77,21 @@ def _grown(own: Own, begin: State, end: State) -> Own | None:
     """``own`` with values of their own for as many parameters as earn them; None where all effects explain as much."""
     rest = max(own.left() - begin.floor, 0.0)
     price = PER_PARAMETER * (len(own.records) - 1) * begin.excess
-    while (offer := own.offered()) is not None:
+    while price < end.excess:
         least = max(OF_EXCESS * rest, OF_FLOOR * begin.floor, price)
-        if rest - max(offer[1] - begin.floor, 0.0) < least:
-            break
-        fitted = own.fitted(offer[0])
-        left = max(fitted.left() - begin.floor, 0.0)
+        names = [name for name, left in own.promised().items() if own.left() - left > least]
+        # First order fails where a contact sticks in the model and slides in the machine.
+        fits = [own.fitted((*own.own, name)) for name in names]
+        best = min(fits, key=lambda each: each.left(), default=own)
+        left = max(best.left() - begin.floor, 0.0)
         if rest - left < least:
             break
-        own, rest = fitted, left
+        own, rest = best, left
+        # What stood in for the last one goes again.
+        for name in own.own[:-1]:
+            without = own.fitted(tuple(each for each in own.own if each != name))
+            if (lacks := max(without.left() - begin.floor, 0.0)) - rest < least:
+                own, rest = without, lacks
     if not own.own or rest + PER_PARAMETER * own.n_additional * begin.excess > end.excess:
         return None
     nats = 0.5 * independent_values(own.track, own.residual) * math.log(max(end.left, 1e-300) / max(own.left(), 1e-300))

@@ -12,7 +12,7 @@ from ..model import Model, Term
 from .candidates import FRICTION, Scales, candidates, place_of
 from .component import Signature, agreed, signatures
 from .confidence import MANY, confidence_of, unknown_confidence
-from .contradiction import Contradiction
+from .differences import Contradiction
 from .fitting import refit
 from .growth import Growth
 from .held_back import OnlyThere

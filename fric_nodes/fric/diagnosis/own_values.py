@@ -198,20 +198,19 @@ class Own:
         unseen = float(np.sum(self._changes(self.own if own is None else own)[1]))
         return self.minded * unseen
 
-    def offered(self) -> tuple[str, float] | None:
-        """The parameter whose own values promise most beside those that are there, and what stays then [F^2]."""
+    def promised(self) -> dict[str, float]:
+        """What stays at first order with own values of one more parameter, by its name [F^2]."""
         names = [name for name, usable in zip(self.names, self.usable, strict=True) if usable and name not in self.own]
-        return min(((name, self.left((*self.own, name))) for name in names), key=lambda each: each[1], default=None)
+        return {name: self.left((*self.own, name)) for name in names}
 
-    def fitted(self, name: str) -> Own:
-        """The same with own values of the parameter ``name`` as well, all values fitted in full."""
-        own = (*self.own, name)
+    def fitted(self, own: tuple[str, ...]) -> Own:
+        """The same with own values of the parameters ``own`` and of no others, all values fitted in full."""
         shared, apart = self._shared(own), [self.names.index(each) for each in own]
         n_records = len(self.records)
         lower, upper = self._bounds()
 
         def at(point: Array) -> Array:
-            values = self.values.copy()
+            values = np.tile(np.mean(self.values, axis=0), (n_records, 1))
             values[:, shared] = point[: len(shared)] * self.scale[shared]
             values[:, apart] = point[len(shared) :].reshape(len(apart), n_records).T * self.scale[apart]
             return values
@@ -219,13 +218,16 @@ class Own:
         def joined(of_each: Array) -> Array:
             return np.concatenate([of_each[shared], np.repeat(of_each[apart], n_records)])
 
-        start = np.concatenate([(self.values[0] / self.scale)[shared], (self.values / self.scale)[:, apart].T.ravel()])
-        start = start + np.mean(self._changes(own)[0], axis=0)
+        now = self.values / self.scale
+        start = np.concatenate([np.mean(now, axis=0)[shared], now[:, apart].T.ravel()])
+        limits = joined(lower), joined(upper)
+        # Where first order leads nowhere, it is begun from where it is.
+        starts = [np.clip(each, *limits) for each in (start, start + np.mean(self._changes(own)[0], axis=0))]
+        start = min(starts, key=lambda point: float(np.sum(self._lacking(at(point)) ** 2)))
         answer = minimise(
             lambda point: self._lacking(at(point)),
             start,
-            joined(lower),
-            joined(upper),
+            *limits,
             difference=5e-3,  # as for any model (:meth:`.track.Track.fit`)
             point_tolerance=1e-4,
             cost_tolerance=1e-5,
@@ -241,14 +243,15 @@ class Own:
         """Least and largest value of each parameter, in units of its scale."""
         bounds = bounds_of(self.model, scales_of(self.track))
         lower, upper = limits_of(self.model, self.names[:-1], self.scale[:-1], bounds)
-        return np.append(lower, 0.0), np.append(upper, np.inf)
+        return np.append(lower, 0.1), np.append(upper, 10.0)  # of the gain: another unit is told by the instrument
 
     def _lacking(self, values: Array) -> Array:
-        """The force that the model lacks with ``values``, shape ``(n_records, n_names)`` [F]."""
+        """The force that the model lacks with ``values``, shape ``(n_records, n_names)``, in units of the recorded one [F]."""
         parts = []
         for track, of_record in zip(self._apart, values, strict=True):
             model = self.model.with_values(self._placed(of_record))
-            parts.append(track.residual(model, _scaled(track, float(of_record[-1]))))
+            gain = float(of_record[-1])
+            parts.append(track.residual(model, _scaled(track, gain)) / gain)
         return np.concatenate(parts)
 
     def _placed(self, values: Array) -> Array:

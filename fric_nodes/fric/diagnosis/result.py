@@ -15,7 +15,7 @@ from ..record import Array
 from .additive.told import ComponentFinding
 from .calibration import Evidence
 from .confidence import AS_LIKELY, FAINT
-from .contradiction import Contradiction
+from .differences import Contradiction
 from .halves import Half
 from .limits import Limit
 from .locate import Where
