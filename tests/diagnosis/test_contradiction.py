@@ -22,7 +22,7 @@ from fric.simulation import simulate
 
 pytestmark = pytest.mark.timeout(600)  # the first of them compiles what all share
 
-H = 2e-3
+H = 4e-3
 NOMINAL = build_model("rigid", {"mass": 2.1}, [term("coulomb", force=5.0), term("viscous", coefficient=22.0)])
 STRIBECK = (term("stribeck", force=4.0, velocity=0.02),)
 
@@ -38,11 +38,11 @@ def recording(
 ) -> Record:
     """Eight seconds of an axis, each ``number`` with a motion and noise of its own."""
     random = np.random.default_rng(number)
-    t = H * np.arange(4000)
+    t = H * np.arange(2000)
     (a, b), (p, q) = random.uniform(0.8, 1.2, 2), random.uniform(0.0, 2.0 * np.pi, 2)
     effort = push * (20.0 * np.sin(2.0 * np.pi * 0.7 * a * t + p) + 10.0 * np.sin(2.0 * np.pi * 2.3 * b * t + q))
     axis = build_model("rigid", {"mass": mass}, [term("coulomb", force=force), term("viscous", coefficient=20.0), *more])
-    position = simulate(axis, effort, H, n_substeps=4).position[: t.size] + 2e-7 * random.standard_normal(t.size)
+    position = simulate(axis, effort, H, n_substeps=8).position[: t.size] + 2e-7 * random.standard_normal(t.size)
     recorded = gain * (effort + 0.02 * random.standard_normal(t.size))
     signals = {name: value + 0.05 * random.standard_normal(t.size) for name, value in measured.items()}
     return Record(t, position, recorded, extra=signals, effort_hold="following", source=f"bag_{number}")
