@@ -92,7 +92,11 @@ def _grown(own: Own, begin: State, end: State) -> Own | None:
             without = own.fitted(tuple(each for each in own.own if each != name))
             if (lacks := max(without.left() - begin.floor, 0.0)) - rest < least:
                 own, rest = without, lacks
-    if not own.own or rest + PER_PARAMETER * own.n_additional * begin.excess > end.excess:
+    if not own.own:
+        return None
+    own = own.fitted(own.own)  # to its end, wherever the last fit began
+    rest = max(own.left() - begin.floor, 0.0)
+    if rest + PER_PARAMETER * own.n_additional * begin.excess > end.excess:
         return None
     nats = 0.5 * independent_values(own.track, own.residual) * math.log(max(end.left, 1e-300) / max(own.left(), 1e-300))
     return own if nats > EVIDENCE else None

@@ -210,7 +210,7 @@ class Own:
         lower, upper = self._bounds()
 
         def at(point: Array) -> Array:
-            values = np.tile(np.mean(self.values, axis=0), (n_records, 1))
+            values = np.tile(np.append(np.mean(self.values, axis=0)[:-1], 1.0), (n_records, 1))
             values[:, shared] = point[: len(shared)] * self.scale[shared]
             values[:, apart] = point[len(shared) :].reshape(len(apart), n_records).T * self.scale[apart]
             return values
