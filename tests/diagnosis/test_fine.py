@@ -23,12 +23,22 @@ def test_lines_are_found_between_the_grid() -> None:
     assert found == pytest.approx([PITCH, 4.1e-3], rel=2e-4)  # a tenth of a cycle over the travel is 6e-4
 
 
+def test_a_line_just_beyond_the_grid_is_found_where_hardly_more_is_seen() -> None:
+    random = np.random.default_rng(4)
+    position = 0.2 * np.sin(np.cumsum(random.uniform(0.0, 2e-3, 8_000)))
+    period = 0.4 / 27.3  # 27.3 cycles over the travel, where 60 are seen
+    missing = 2.0 * np.cos(2 * np.pi * position / period) + np.sin(8.0 * position) + random.standard_normal(position.shape[0])
+    assert fine_periods(position, missing, 24.0, 60.0) == pytest.approx([period], rel=2e-3)
+    assert fine_periods(position, missing, 24.0, 26.0) == []
+
+
 @pytest.mark.parametrize("seed", range(20))
-def test_noise_has_no_lines(seed: int) -> None:
+@pytest.mark.parametrize("seen", [60.0, 400.0])
+def test_noise_has_no_lines(seen: float, seed: int) -> None:
     random = np.random.default_rng(seed)
     position = 0.2 * np.sin(np.cumsum(random.uniform(0.0, 2e-3, 6_000)))
     slow = np.convolve(random.standard_normal(6_200), np.exp(-np.arange(201) / 40.0), "valid")
-    assert fine_periods(position, slow, 24.0, 400.0) == []
+    assert fine_periods(position, slow, 24.0, seen) == []
 
 
 def test_an_axis_that_hardly_moves_has_none() -> None:

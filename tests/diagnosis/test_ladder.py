@@ -134,3 +134,36 @@ def test_other_recordings_are_looked_at_as_they_are() -> None:
     assert ladder_of([*train[:-1], turned], validation, nominal()) is None
     assert ladder_of(train[:6], validation, nominal()) is None
     assert ladder_of(train[::2], validation, nominal()) is None
+
+
+def falling(v: float) -> float:
+    """A surplus that falls over all speeds, and viscous friction of next to nothing beside it."""
+    return float(np.sign(v) * 6.0 * np.exp(-((v / 0.15) ** 2))) - 8.0 * v
+
+
+def test_a_surplus_beside_which_no_other_curve_is_possible_is_named() -> None:
+    """Without it viscous friction would have to be negative: there is no plain curve with all of the nominal terms."""
+    found = diagnose(*runs(falling), nominal())
+    assert effects(found) == ["stribeck"]
+    assert found.findings[0].parameters["stribeck.force"].value == pytest.approx(6.0, rel=0.1)
+    assert found.findings[0].parameters["stribeck.velocity"].value == pytest.approx(0.15, rel=0.1)
+    assert found.nominal.refit_parameters["viscous.coefficient"] == 0.0
+    assert found.validation.noe_augmented < 0.01 * found.validation.noe_refit
+
+
+@pytest.mark.parametrize("more", [0.0, 30.0])
+def test_a_nominal_model_with_a_stribeck_effect_keeps_it(more: float) -> None:
+    """All curves have it then: there is none without it to be compared with."""
+    had = nominal(term("stribeck", force=1.0, velocity=0.05))
+    found = diagnose(*runs(lambda v: float(np.sign(v) * 1.5 * np.exp(-((v / 0.03) ** 2)) + more * v * abs(v))), had)
+    assert effects(found) == (["quadratic_drag"] if more else [])
+    assert found.model.value("stribeck.force") == pytest.approx(1.5, rel=0.15)
+    assert found.model.value("stribeck.velocity") == pytest.approx(0.03, rel=0.2)
+
+
+def test_a_stribeck_effect_of_the_nominal_model_that_is_none_comes_out_at_nothing() -> None:
+    """Friction rises from the slow runs on, where a surplus would make it fall; the other terms are found all the same."""
+    had = nominal(term("stribeck", force=1.0, velocity=0.05))
+    found = diagnose(*runs(lambda v: -float(np.sign(v) * 1.5 * np.exp(-((v / 0.01) ** 2)))), had)
+    assert found.nominal.refit_parameters["stribeck.force"] == 0.0
+    assert found.nominal.refit_parameters["viscous.coefficient"] > 4.0

@@ -87,8 +87,8 @@ def extended_by_terms(
             last = screened(track, state)
             break
     else:
-        ended = most == _MOST_TERMS
-        last = screened(track, state) if ended else last
+        ended = most == _MOST_TERMS and len(steps) >= most  # and not because the time is over
+        last = screened(track, state) if most == _MOST_TERMS else last
     return replace(growth, track=track, end=state, steps=tuple(steps), last=last, beginnings=beginnings, ended=ended)
 
 

@@ -20,7 +20,7 @@ from ..identification.static_maps.load import MeanForce
 from ..identification.static_maps.smoothness import structure_of
 from ..identification.static_maps.weighted import as_normal
 from ..instrument import Finding as Check
-from ..model import Model, Term
+from ..model import Model
 from ..record import Array, Mask, Record
 from .candidates import FRICTION, place_of
 from .confidence import AS_LIKELY, UNEXPLAINED, unknown_confidence
@@ -37,6 +37,7 @@ from .curve_terms import (
     weight_of,
     with_effect,
 )
+from .fitting import with_amplitudes
 from .ladder import Ladder
 from .locate import Where, direction
 from .result import Diagnosis, Estimate, Finding, Grown, NominalPart, Prediction, Rejected, RunnerUp, Unexplained, Validation
@@ -275,7 +276,8 @@ def _where(
 def _model(nominal: Model, curve: Curve, choice: Choice) -> Model:
     """The nominal model's plant with the curve's terms, its own first, and their standard errors."""
     found = {held.effect.id: held for held in curve_terms(curve)}
-    own = [found.pop(held.effect.id, Term(held.effect, (0.0,) * len(held.values))) for held in nominal.terms]
+    nothing = [with_amplitudes(held, held.effect.amplitudes, [0.0] * len(held.effect.amplitudes)) for held in nominal.terms]
+    own = [found.pop(held.effect.id, held) for held in nothing]
     model = nominal.with_terms([*own, *found.values()])
     wide = as_normal(curve.freedom) * (choice.widening if curve is choice.best else 1.0)
     errors = np.sqrt(np.maximum(np.diag(curve.covariance), 0.0)) * wide

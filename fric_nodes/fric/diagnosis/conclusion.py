@@ -64,7 +64,7 @@ from .track import Track
 
 __all__ = ["concluded"]
 
-_MISMATCH = 0.35  # of the floor: less than this above it is no mismatch
+_MISMATCH = 0.35  # of the floor: with less than this left above it, nothing stays unexplained
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
 _LEFT_UNSEEN = 0.05  # of what is missing in the recordings held back: what has the right structure leaves less there
 _NEGLIGIBLE = 1e-4  # NOE [%]: a force within a thousandth is what steps of any simulation and sampling differ by
@@ -240,7 +240,7 @@ def _judged(validation: Sequence[Record], whole: Sequence[Track], nominal: Model
     noise_floor = 100.0 * mean_square(floor) / spread
     scored = Validation(noe["nominal"], noe["refit"], noe["augmented"], noise_floor)
     told = noe["refit"] > _NEGLIGIBLE
-    learnt = growth.begin.excess > _MISMATCH * growth.begin.floor or bool(growth.steps)
+    learnt = growth.stands_out or bool(growth.steps)
     # What the recordings held back don't show has been chance, or has been over before they were made.
     missing = (
         told

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -75,13 +76,17 @@ def refitted(candidate: Candidate, points: Points, scatter: float) -> Curve:
         points: mean forces over speed.
         scatter: of the means from run to run, beside their own errors [F].
     """
-    for stripped in (candidate, replace(candidate, quadratic=False), replace(candidate, viscous=False, quadratic=False)):
-        curve = fitted(stripped, points, scatter)
-        if curve is not None:
-            return curve
-    plain = fitted(Candidate(), points, scatter)
-    assert plain is not None
-    return plain
+    curve = fitted(candidate, points, scatter)
+    if curve is not None:
+        return curve
+    poorer = [
+        fitted(replace(candidate, viscous=viscous, quadratic=quadratic, stribeck=stribeck), points, scatter)
+        for viscous, quadratic, stribeck in product(
+            {candidate.viscous, False}, {candidate.quadratic, False}, {candidate.stribeck, ""}
+        )
+    ]
+    possible = [each for each in (*poorer, fitted(Candidate(), points, scatter)) if each is not None]
+    return min(possible, key=lambda each: (each.cost, len(each.candidate.names)))
 
 
 def _cost(curve: Curve, points: Points) -> float:
@@ -130,7 +135,7 @@ def force_of_term(effect: str, curve: Curve, velocity: Array) -> Array:
     """The force of one term of ``curve`` [F], shape ``(n,)``."""
     alone = np.array(
         [
-            value if name.split(".")[0] == effect else 0.0
+            value if name.split(".")[0] == effect or name == "stribeck.velocity" else 0.0
             for name, value in zip(curve.candidate.names, curve.values.tolist(), strict=True)
         ]
     )

@@ -109,7 +109,7 @@ def _diagnosed(train: Sequence[Record], validation: Sequence[Record], nominal: M
     parts = excerpt(tracks, start)
     searched = list(tracks if parts is None else parts.tracks)
     growth = reproduced(_grown_by_all(searched, start, tell), tell)
-    if growth.beyond > 0.0 or growth.rest > most_left(growth):
+    if growth.stands_out and (growth.beyond > 0.0 or growth.rest > most_left(growth)):
         growth = helped(searched, growth, tell)
     if is_over():
         corrected.append("the search was ended after the time that was asked for: further effects may be missing")
@@ -124,7 +124,7 @@ def _diagnosed(train: Sequence[Record], validation: Sequence[Record], nominal: M
     found = concluded(train, validation, nominal, checks, corrected, tracks, searched, growth)
     if contradiction is not None:
         found = contradicted(found, contradiction)
-    elif any(each.effect == "unknown" for each in found.findings):
+    elif not is_over() and any(each.effect == "unknown" for each in found.findings):
         tell("weighing what is left by the components of the machine")
         found = replace(found, components=by_component(searched, found.model))
     return _with_inertia(found, nominal, train) if massless else found
@@ -146,7 +146,7 @@ def _grown_by_all(tracks: Sequence[Track], start: Model, tell: Callable[[str], N
     model that leaves less to the fastest observer is taken.
     """
     begun = first_terms(tracks, start, tell)
-    proposed = together(tracks, start, tell) if leaves_much(begun[1]) else None
+    proposed = together(tracks, start, tell) if begun[0].stands_out and leaves_much(begun[1]) else None
     complete = by_parts(tracks, proposed, tell) if proposed is not None else None
     if complete is not None:
         return with_moves(complete, tell)
@@ -154,7 +154,7 @@ def _grown_by_all(tracks: Sequence[Track], start: Model, tell: Callable[[str], N
     if better is not None:
         return better
     growth = with_moves(grow(tracks, start, tell, begun), tell)
-    if growth.beyond > 0.0 or growth.rest > most_left(growth):
+    if growth.stands_out and (growth.beyond > 0.0 or growth.rest > most_left(growth)):
         return by_parts(tracks, proposed or together(tracks, start, tell), tell, growth) or growth
     return growth
 

@@ -34,8 +34,9 @@ def fine_periods(position: Array, missing: Array, fewest: float, most: float) ->
         most: cycles up to which.
     """
     travel = float(np.ptp(position))
-    cycles = np.arange(fewest, min(most, _MOST), _STEP)
-    if travel == 0.0 or cycles.size < 4.0 * _AROUND / _STEP:
+    # Coarser periods, too, tell the level: it is known where hardly more than the fewest cycles are seen.
+    cycles = np.arange(1.0, min(most, _MOST), _STEP)
+    if travel == 0.0 or float(np.ptp(missing)) == 0.0 or most <= fewest:
         return []
     phase = -2j * math.pi * (position - float(np.mean(position))) / travel
     turning, turn = (missing - np.mean(missing)) * np.exp(phase * cycles[0]), np.exp(phase * _STEP)
@@ -44,9 +45,10 @@ def fine_periods(position: Array, missing: Array, fewest: float, most: float) ->
         power[k] = abs(complex(np.sum(turning))) ** 2
         turning *= turn
     level = median_filter(power, int(_AROUND / _STEP) | 1, mode="nearest") / math.log(2.0)
-    peaks, _ = find_peaks(np.where(power > _STANDS_OUT * level, power, 0.0), distance=round(1.0 / _STEP))
+    stands_out = (cycles >= fewest) & (power > _STANDS_OUT * level)
+    peaks, _ = find_peaks(np.where(stands_out, power, 0.0), distance=round(1.0 / _STEP))
     strongest = sorted((int(peak) for peak in peaks), key=lambda peak: -power[peak])[:_LINES]
-    return [travel / (cycles[peak] + _STEP * _summit(power[peak - 1 : peak + 2])) for peak in strongest]
+    return [float(travel / (cycles[peak] + _STEP * _summit(power[peak - 1 : peak + 2]))) for peak in strongest]
 
 
 def _summit(three: Array) -> float:

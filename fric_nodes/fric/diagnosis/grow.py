@@ -28,7 +28,6 @@ _TO_COMPARE = 2  # terms, after which another beginning is tried
 _OTHER_BEGINNINGS = 2
 _AGAIN_FOR_MORE = 0.01  # as AGAIN, where more terms would come
 _MUCH = 0.3  # of what is missing: with more left, another observer may see what it is
-_HARDLY = 0.5  # of what is missing: with more left, it is hardly explained
 _FASTER = 0.02  # of what is missing: with more left to a faster observer, it is looked at what that is
 
 
@@ -68,7 +67,7 @@ def grow(
     if not is_over() and best.rest > _MUCH and slower and (best.steps or best.end.excess > NOTHING * best.end.floor):
         tell(f"much of it stays unexplained to an observer of {best.track.bandwidth:.3g} rad/s; looking with a slower one")
         other = _best_growth(slower, nominal, tell)
-        if other.steps and other.rest < min(best.rest, _HARDLY):
+        if other.steps and other.rest < min(best.rest, HOPELESS):
             return replace(other, slower=True, beyond=left_beyond(best, other))
     return grown_faster(tracks, best, tell)
 
@@ -139,7 +138,7 @@ def _best_growth(
     """The best of the models grown from several first terms, or from a faint one where these explain hardly anything."""
     start, first = begun or first_terms(tracks, nominal, tell)
     best = grown_on(tracks, _compared(tracks, start, first, tell), tell)
-    faintly = best.rest > _HARDLY and best.begin.excess < FAINTLY * best.begin.floor
+    faintly = best.rest > HOPELESS and best.begin.excess < FAINTLY * best.begin.floor
     if not is_over() and (not best.steps or faintly):
         faint = faint_term(tracks, nominal, tell)
         if faint is not None and faint.steps and (not best.steps or faint.rest < best.rest):

@@ -21,6 +21,7 @@ __all__ = [
     "AGAIN",
     "FAINTLY",
     "LITTLE",
+    "NAMELESS",
     "Growth",
     "fast_observer",
     "left_to_a_fast_observer",
@@ -35,6 +36,8 @@ LITTLE = 0.004
 """Statistical, of what is missing at the start: laws that differ in form only leave as much."""
 FAINTLY = 3.0
 """Statistical, times the floor: with less missing, the share that is left says nothing, and a faint term is looked for."""
+NAMELESS = 1.0
+"""Statistical, times the floor: less than that above it, what no effect explains could be the measuring chain's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +78,11 @@ class Growth:
     def price(self) -> float:
         """What is left, and a price for each parameter, by which grown models are compared."""
         return self.rest + self.dear
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether so much is missing that it is physics even where no effect explains it."""
+        return self.begin.excess > NAMELESS * self.begin.floor
 
     @property
     def dear(self) -> float:

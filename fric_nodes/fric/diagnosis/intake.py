@@ -80,6 +80,8 @@ def without_faults(
         notes.append(f"corrected before anything was fitted: {correction.text} ({check.detail})")
     of_all: dict[str, Correction] = {}
     for check, correction in wrong:
+        if correction.position_error is not None:
+            continue  # where an encoder's lines lie is known only to the recording that shows them
         if check.recording is None or sum(each.check == check.check for each, _ in wrong) == len(held):
             of_all.setdefault(check.check, correction)
     for k, record in enumerate(validation):
@@ -99,6 +101,8 @@ def without_faults(
 
 
 def _correction_of(check: Check) -> Correction | None:
-    """What takes the fault out that ``check`` has found, or None."""
-    delayed = check.correction is None or check.correction.effort_shift != 0.0
-    return None if delayed or check.verdict != "fault" else check.correction
+    """What takes out the fault that ``check`` has found, or the error within an encoder's lines; else None."""
+    correction = check.correction
+    if correction is None or correction.effort_shift != 0.0:
+        return None
+    return correction if check.verdict == "fault" or correction.position_error is not None else None

@@ -46,7 +46,7 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         found: the screening beside it.
         scales: of the recordings.
         to_beat: what something else leaves in their place [F^2]. Where that is hardly anything, fewer candidates are tried; a
-            rival that is far from it after its rough fit gets no further iterations.
+            rival that is far from it after its rough fit gets no further iterations, and no other forms.
     """
     fitted: list[Rival] = []
     much = state.floor + max(_ROUGH * state.excess, OF_FLOOR * state.floor)
@@ -56,7 +56,7 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
     fitted = side_by_side(track, fitted, found.unpaid)
     for k in _worth_refining(state, fitted):
         rival = fitted[k]
-        if state.left - rival.left < _IN_REACH * (state.left - to_beat):
+        if not _reaches(state, rival, to_beat):
             continue
         bounds = bounds_of(rival.fit.model, scales)
         fit = track.fit(rival.fit.model, rival.fit.names, 8, bounds)
@@ -67,15 +67,22 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
             fitted[k] = extended(track, state, fitted[k], found, scales)
     fitted = with_play(track, state, fitted, found, scales)
     fitted = side_by_side(track, fitted, found.unpaid)
-    if to_beat > much and fitted and fitted[0].left > much:
+    if to_beat > much and fitted and fitted[0].left > much and _reaches(state, fitted[0], to_beat):
         giving = that_give(track, state, fitted[0], found, scales)
         fitted = side_by_side(track, [*fitted, *giving], found.unpaid) if giving else fitted
     if to_beat > much:
         fitted = side_by_side(track, _fitted_out(track, state, fitted, found, scales), found.unpaid)
     n_shaped = _SHAPED if to_beat > much else 1
-    in_shape = [shaped(track, state, rival, found, scales) for rival in fitted[:n_shaped]]
+    in_shape = [
+        shaped(track, state, rival, found, scales) if _reaches(state, rival, to_beat) else rival for rival in fitted[:n_shaped]
+    ]
     ranked = side_by_side(track, [*in_shape, *fitted[n_shaped:]], found.unpaid)
     return side_by_side(track, _simpler_from_there(track, state, ranked, found, scales), found.unpaid)
+
+
+def _reaches(state: State, rival: Rival, to_beat: float) -> bool:
+    """Whether ``rival`` takes off enough for more iterations, or another form of it, to beat what leaves ``to_beat`` [F^2]."""
+    return state.left - rival.left >= _IN_REACH * (state.left - to_beat)
 
 
 def _simpler_from_there(track: Track, state: State, ranked: list[Rival], found: Screening, scales: Scales) -> list[Rival]:

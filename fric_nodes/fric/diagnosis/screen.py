@@ -174,23 +174,25 @@ class Promise:
         behind = not along.can(fit.model)
         self._model = _without_transmission(fit.model) if behind else fit.model
         self._able = along.can(self._model)
+        # A low-passed force needs no more rows than these for its projections.
+        self._rows = slice(None, None, along.stride)
         if self._able:
-            # A low-passed force needs no more rows than these for its projections.
-            self._rows = slice(None, None, along.stride)
             self._base = along.residual(self._model)[self._rows]
-            if behind:
-                missing, columns = fit.residual[along.moving][self._rows], fit.jacobian[along.moving][self._rows]
-            else:
-                missing, columns = self._base, along.changes(fit.model, fit.names, fit.scale)[self._rows]
-            self._basis, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
-            self._missing = missing - self._basis @ (self._basis.T @ missing)
+        if behind:
+            missing, columns = fit.residual[along.moving][self._rows], fit.jacobian[along.moving][self._rows]
+        else:
+            missing, columns = self._base, along.changes(fit.model, fit.names, fit.scale)[self._rows]
+        self._basis, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+        self._missing = missing - self._basis @ (self._basis.T @ missing)
 
     def narrowed(self, candidate: Candidate) -> list[Term]:
         """The trials of ``candidate`` that promise most."""
         effect = candidate.effect
-        if not self._able or effect.neutral is None or effect.command is not None:
+        if effect.neutral is None or effect.command is not None:
             return list(candidate.trials)
         trials = [*candidate.trials, *self._fine(candidate)]
+        if not self._able:
+            return trials
         promise = [self._of(trial) for trial in trials]
         order = np.argsort(promise)[::-1][:_KEPT]
         return [trials[k] for k in order if promise[k] > 0.0]
@@ -198,7 +200,7 @@ class Promise:
     def _fine(self, candidate: Candidate) -> list[Term]:
         """Trials of periods finer than those of ``candidate``, where what is missing has such."""
         names = [p.name for p in candidate.effect.parameters]
-        if "period" not in names:
+        if "period" not in names or not self._missing.size:
             return []
         at = names.index("period")
         position, velocity = (self._along.seen(name)[self._rows] for name in ("position", "velocity"))

@@ -21,6 +21,7 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array, Record
+from .lines import PositionError
 from .view import View
 
 __all__ = ["Check", "Correction", "Evidence", "Finding", "Verdict", "each"]
@@ -39,6 +40,7 @@ class Correction:
         effort_offset: added to the effort after its factor [F].
         effort_shift: time by which the effort has to come earlier [s].
         effort_stretch: further such time per time of the recording [s/s].
+        position_error: that is taken off the position as recorded, or None.
     """
 
     position_factor: float = 1.0
@@ -47,6 +49,7 @@ class Correction:
     effort_offset: float = 0.0
     effort_shift: float = 0.0
     effort_stretch: float = 0.0
+    position_error: PositionError | None = None
 
     def apply(self, record: Record) -> Record:
         """``record`` as it would be without the fault, with a note of what was done."""
@@ -54,9 +57,11 @@ class Correction:
         effort = self.effort_factor * np.interp(record.time + shift, record.time, record.effort) + self.effort_offset
         # Where the shifted effort would come from outside the recording, nobody knows it.
         inside = (record.time + shift >= 0.0) & (record.time + shift <= record.time[-1])
+        error = self.position_error
+        position = record.position if error is None else error.taken_off(record.position)
         return replace(
             record,
-            position=self.position_factor * record.position,
+            position=self.position_factor * position,
             reference=None if record.reference is None else self.position_factor * record.reference,
             velocity=None if record.velocity is None else self.velocity_factor * record.velocity,
             effort=np.asarray(effort, dtype=np.float64),
@@ -81,6 +86,9 @@ class Correction:
             parts.append(f"effort {1e3 * self.effort_shift:+.4g} ms earlier")
         if self.effort_stretch:
             parts.append(f"effort's clock by {1e6 * self.effort_stretch:+.4g} ppm")
+        if self.position_error is not None:
+            error = self.position_error
+            parts.append(f"position without an error of {error.amplitude:.3g} within lines of {error.pitch:.4g}")
         return ", ".join(parts) or "nothing"
 
 

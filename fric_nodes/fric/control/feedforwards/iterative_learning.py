@@ -24,7 +24,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from ...parameter import Parameter
 from ...record import Array
@@ -91,6 +90,8 @@ def learnt(force: Array, error: Array, correction: Array, period: float, cutoff:
     if not 0.0 < cutoff < 0.5 / period:
         problem = f"cutoff {cutoff:g} Hz is not between 0 and half the sampling rate"
         raise FeedforwardKindError("iterative learning", problem, "give a lower one")
+    from scipy.signal import butter, sosfiltfilt  # a node that only gives the force need not wait for it
+
     sections = butter(2, cutoff, fs=1.0 / period, output="sos")
     # A pass repeats: it is filtered between its neighbours.
     n = force.shape[0]

@@ -136,7 +136,7 @@ class Choice:
         rival: the best curve with a Stribeck effect where ``best`` has none, and without where it has one; None when there
             is none.
         all: every candidate that was possible, best first.
-        p_value: probability of as much of a Stribeck effect by chance; NaN when it couldn't be tested.
+        p_value: probability of as much of a Stribeck effect by chance; NaN when it couldn't be tested, or every curve has one.
         f_value: the statistic behind it.
         widening: of the standard errors of the parameters of ``best``, for which candidate is chosen hangs on the noise too,
             shape ``(n_parameters,)``. The force itself, which all good candidates agree on, doesn't need it.
@@ -299,20 +299,22 @@ def choose(points: Points, seed: int = 1, at_least: Candidate | None = None) -> 
     Args:
         points: at least three, of both directions.
         seed: of the draws behind the test for a Stribeck effect.
-        at_least: terms that every curve has, however small they come out.
+        at_least: terms that every curve has, however small they come out. Where no curve without a Stribeck effect is possible
+            with them, those of them that would be negative are left out of it.
     """
     several = points.n_speeds
     viscous = (False, True) if several >= 2 else (False,)
     more = (False, True) if several >= 3 else (False,)
     laws = ("", *STRIBECK_LAWS) if several >= 4 else ("",)
-    every = [Candidate(v, s, q, a) for v, s, q, a in product(viscous, laws, more, viscous)]
-    every = [c for c in every if at_least is None or c.holds(at_least)]
+    possible = [Candidate(v, s, q, a) for v, s, q, a in product(viscous, laws, more, viscous)]
+    every = [c for c in possible if at_least is None or c.holds(at_least)]
     n = points.velocity.shape[0]
     rich = [c for c in every if n - len(c.names) >= 3]
     scatter = min((_scatter(c, points) for c in rich[-1:]), default=0.0)
     found = [curve for c in every if (curve := fitted(c, points, scatter)) is not None]
-    if not found:
-        found = [_mean_only(points)]
+    given = at_least is not None and bool(at_least.stribeck)
+    if not found or (not given and all(curve.candidate.stribeck for curve in found)):
+        found += _plain(possible, points, scatter, at_least or Candidate())
     found.sort(key=lambda curve: curve.criterion)
     without = [curve for curve in found if not curve.candidate.stribeck]
     with_it = [curve for curve in found if curve.candidate.stribeck]
@@ -321,10 +323,21 @@ def choose(points: Points, seed: int = 1, at_least: Candidate | None = None) -> 
     if len(laws) > 1 and without:
         base = max(without, key=lambda curve: (len(curve.candidate.names), -curve.criterion)).candidate
         f_value, p_value = _test_stribeck(base, points, scatter, np.random.default_rng(seed))
-    there = bool(with_it) and p_value < _SIGNIFICANT and with_it[0].criterion < without[0].criterion
-    best, rival = (with_it[0], without[0]) if there else (without[0], with_it[0] if with_it else None)
+    there = bool(with_it) and (not without or (p_value < _SIGNIFICANT and with_it[0].criterion < without[0].criterion))
+    rivals = without if there else with_it
+    best, rival = (with_it if there else without)[0], rivals[0] if rivals else None
     ordered = (best, *[curve for curve in found if curve is not best])
     return Choice(best, rival, ordered, p_value, f_value, _widening(best, with_it if there else without))
+
+
+def _plain(possible: Sequence[Candidate], points: Points, scatter: float, at_least: Candidate) -> list[Curve]:
+    """Curves without a Stribeck effect where none has all terms of ``at_least``: what can't be negative is zero instead.
+
+    Where a strong surplus falls over all speeds, viscous friction without it would come out negative.
+    """
+    plain = [curve for c in possible if not c.stribeck and (curve := fitted(c, points, scatter)) is not None]
+    whole = [curve for curve in plain if curve.candidate.holds(replace(at_least, stribeck=""))]
+    return whole or plain or [_mean_only(points)]
 
 
 def _widening(best: Curve, others: Sequence[Curve]) -> Array:

@@ -20,6 +20,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from ...model import Model
 from ...record import Array, Record
+from ...signals.resolution import noise_of, step_of
 from ..view import runs
 from .axes import ACTIVE, AXES, Rig, draw_rig, record_of, run_rig, scaled_nominal
 
@@ -222,6 +223,16 @@ def _coarse_position(record: Record, random: np.random.Generator) -> Record:
     return replace(record, position=step * np.round(record.position / step))
 
 
+def _interpolated(record: Record, random: np.random.Generator) -> Record:
+    """An encoder whose signals have an offset and unequal amplitudes: first and second harmonic of its lines."""
+    pitch = float(np.ptp(record.position)) / float(np.exp(random.uniform(*np.log((40.0, 400.0)))))
+    size = float(random.uniform(1.0, 4.0)) * max(step_of(record.position), 3.0 * noise_of(record.position))
+    angle = 2.0 * np.pi * record.position / pitch
+    first, second = random.uniform(0.0, 2.0 * np.pi, 2)
+    error = size * (0.8 * np.sin(angle + first) + 0.6 * np.sin(2.0 * angle + second))
+    return replace(record, position=record.position + error)
+
+
 def _coarse_effort(record: Record, random: np.random.Generator) -> Record:
     step = float(np.ptp(record.effort)) / float(random.uniform(6.0, 14.0))
     return replace(record, effort=step * np.round(record.effort / step))
@@ -312,6 +323,7 @@ FAULTS: tuple[Fault, ...] = (
     _fault("repeated samples", "stamps", _done(ACTIVE, _repeats)),
     _fault("jitter", "stamps", _done(_BUSY, _jittering), "warning", "fault"),
     _fault("coarse position", "resolution", _done(_BUSY, _coarse_position)),
+    _fault("errors within an encoder's lines", "interpolation", _done(_BUSY, _interpolated), "warning"),
     _fault("coarse effort", "resolution", _done(_BUSY, _coarse_effort)),
     _fault("effort of wrong sign", "effort_sign", _done(_BUSY, lambda r, _: replace(r, effort=-r.effort))),
     _fault("position of wrong sign", "position_sign", _done(_FOLLOWED, lambda r, _: replace(r, position=-r.position))),
