@@ -161,3 +161,12 @@ def test_a_measured_cause_is_left_to_the_effects(measured: str) -> None:
 def test_a_temperature_that_is_constant_but_for_its_noise_explains_nothing() -> None:
     train = [recording(k, mass=mass, temperature=21.0 + 0.01 * k) for k, mass in ((1, 2.0), (2, 2.8), (3, 2.0))]
     assert contradiction(*train) is not None
+
+
+def test_where_every_recording_differs_all_values_are_told() -> None:
+    found = contradiction(*(recording(k, force=force) for k, force in ((1, 5.0), (2, 7.0), (3, 9.0))))
+    assert found is not None
+    (told,) = found.differs
+    assert not told.others_agree
+    assert all(f"in bag_{k}" in told.phrase for k in (1, 2, 3))
+    assert [value for _, value, _ in told.values] == pytest.approx([5.0, 7.0, 9.0], rel=0.02)

@@ -137,6 +137,7 @@ def _told(found: Differing, own: Own, train: Sequence[Record]) -> Told:
         std=found.std,
         interval=(found.difference - found.reach, found.difference + found.reach),
         values=tuple(zip(sources, found.values.tolist(), found.stds.tolist(), strict=True)),
+        others_agree=found.others_agree,
     )
 
 

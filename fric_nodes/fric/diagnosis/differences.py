@@ -24,6 +24,7 @@ class Told:
         std: standard error of the difference.
         interval: of the difference, 95 %.
         values: source, value and standard error in each recording.
+        others_agree: whether the values in the other recordings are one but for their errors.
     """
 
     parameter: str
@@ -36,11 +37,15 @@ class Told:
     std: float
     interval: tuple[float, float]
     values: tuple[tuple[str, float, float], ...]
+    others_agree: bool = True
 
     @property
     def phrase(self) -> str:
-        """Values and difference in words."""
+        """Values and difference in words; where the others differ, too, all values."""
         unit = "" if self.unit == "1" else f" {self.unit}"
+        if not self.others_agree:
+            each = [f"{value:.4g}(± {std:.1g}){unit} in {source}" for source, value, std in self.values]
+            return f"{self.parameter} is {', '.join(each[:-1])} and {each[-1]}"
         number, source = self.recording
         digits = max(1 - math.floor(math.log10(max(self.std, 1e-300))), 0)  # two of the standard error
         low, high = self.interval
@@ -61,6 +66,7 @@ class Told:
             "difference": self.difference,
             "std": self.std,
             "interval": list(self.interval),
+            "others_agree": self.others_agree,
             "values": [{"source": source, "value": value, "std": std} for source, value, std in self.values],
         }
 

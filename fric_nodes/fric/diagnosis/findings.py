@@ -219,13 +219,16 @@ def contradicted(found: Diagnosis, contradiction: Contradiction) -> Diagnosis:
         noe_after=found.validation.noe_augmented,
     )
     number, source = first.recording
+    again = f"make recording {number} ({source}) again under the conditions of the others, or diagnose it by itself"
+    if not first.others_agree:
+        again = "make the recordings again under the same conditions, or diagnose each by itself"
     return replace(
         found,
         mismatch=True,
         findings=(unknown, *(replace(each, confidence=min(each.confidence, _UNDECIDED)) for each in rest)),
         next_experiment=(
-            f"make recording {number} ({source}) again under the conditions of the others, or diagnose it by itself, with the "
-            "model of its own load, lubricant and sensor"
+            f"{again}, with the model of its own load, lubricant and sensor; or record what differs (a load, pressure or "
+            "temperature) as a signal, so that its effect can be found"
         ),
         notes=(*found.notes, f"{contradiction.sentence} One model can't hold for all of them; its values are averages."),
         contradiction=contradiction,

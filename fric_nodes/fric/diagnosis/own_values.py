@@ -20,6 +20,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from scipy.stats import f as f_ratio
 from scipy.stats import t as student
 
 from ..identification.gauss_newton import minimise
@@ -53,6 +54,7 @@ class Differing:
         difference: of the recording from these.
         std: standard error of that.
         reach: half of its interval of 95 %, by Student's t for as many blocks as a recording has.
+        others_agree: whether the values in the others are one but for their errors.
     """
 
     parameter: str
@@ -63,6 +65,7 @@ class Differing:
     difference: float
     std: float
     reach: float
+    others_agree: bool
 
     @property
     def is_sure(self) -> bool:
@@ -294,10 +297,13 @@ class Own:
         blocks = min(sum(record == k for record, _ in self._blocks) for k in range(n_records))
         reach = std * float(student.ppf(0.975, blocks - 1))
         others = float(weights[odd] @ values)
+        # F test of their scatter about their mean
+        agree = n_records < 3 or unlike[odd] / (n_records - 2) < float(f_ratio.ppf(0.95, n_records - 2, blocks - 1))
         if name == GAIN:
             values = np.exp(values - others)
             stds, std, reach, others = stds * values, std * values[odd], reach * values[odd], 1.0
-        return Differing(name, self.records[odd], values, stds, others, float(values[odd]) - others, float(std), float(reach))
+        difference = float(values[odd]) - others
+        return Differing(name, self.records[odd], values, stds, others, difference, float(std), float(reach), bool(agree))
 
     def _variance(self, moved: Array) -> float:
         """Of what is ``moved`` so far where each block is left out, shape ``(n_blocks,)``."""
