@@ -69,6 +69,20 @@ def test_what_is_there_is_found_in_either_half_with_the_same_values(found: dict[
         assert np.hypot(half.parameters["ripple.cosine"], half.parameters["ripple.sine"]) == pytest.approx(2.0, rel=0.1)
 
 
+def test_halves_agree_about_what_is_there(found: dict[str, Presence]) -> None:
+    ripple = found["ripple"]
+    one, other = (half.parameters for half in ripple.halves)
+    # Nothing else in the model does what a ripple does: its own force is all of it, and so is the difference.
+    place = 2.0 * np.pi * np.linspace(0.0, 0.3, 3001)
+    force = [
+        each["ripple.cosine"] * np.cos(place / each["ripple.period"]) + each["ripple.sine"] * np.sin(place / each["ripple.period"])
+        for each in (one, other)
+    ]
+    ratio = np.sum(np.mean(force, axis=0) ** 2) / np.sum((force[0] - force[1]) ** 2)
+    assert ripple.evidence.agreement == pytest.approx(np.log(ratio), abs=1.5)
+    assert ripple.evidence.agreement > found["quadratic_drag"].evidence.agreement
+
+
 def test_what_stays_unexplained_never_makes_surer(found: dict[str, Presence], fitted: Fitted) -> None:
     sure = presences(*fitted, SHARES, 0.4)
     assert all(sure[name].probability <= each.probability for name, each in found.items())

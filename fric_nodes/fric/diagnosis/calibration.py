@@ -20,6 +20,7 @@ __all__ = ["FORMAT", "Calibration", "Evidence", "calibration", "measures_of"]
 FORMAT = "fric-calibration/1"
 _LEAST = 1e-3  # numerical: of a share, whose logarithm is taken
 _MARGIN = 7.0  # numerical: a rival that leaves a thousand times more is out
+_AGREES = 7.0  # numerical: halves that differ by 3 % of the force agree
 _SURE = 12.0  # numerical: logarithm of odds, beyond which nothing is surer
 
 
@@ -45,6 +46,7 @@ class Evidence:
     rivals: float = 1.0
     margin: float = 0.0
     complete: bool = False
+    agreement: float = 0.0
 
 
 def measures_of(evidence: Evidence) -> dict[str, float]:
@@ -60,6 +62,7 @@ def measures_of(evidence: Evidence) -> dict[str, float]:
         "rivals": math.log(min(max(evidence.rivals, _LEAST), 1.0)),
         "margin": min(max(evidence.margin, 0.0), _MARGIN),
         "complete": float(evidence.complete),
+        "agreement": min(max(evidence.agreement, -_AGREES), _AGREES),
     }
 
 
@@ -85,7 +88,7 @@ class Calibration:
     def probability(self, effect: str, evidence: Evidence) -> float:
         """That the effect with the id ``effect`` is there and none of its rivals, 0 to 1."""
         odds = self.offset + self.effects.get(effect, 0.0)
-        odds += sum(self.weights[name] * value for name, value in measures_of(evidence).items())
+        odds += sum(self.weights.get(name, 0.0) * value for name, value in measures_of(evidence).items())
         return 1.0 / (1.0 + math.exp(-min(max(odds, -_SURE), _SURE)))
 
 

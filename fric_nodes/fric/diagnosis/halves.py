@@ -71,6 +71,23 @@ class Halves:
             found.append(Half(nats, {key: value for key, value in values.items() if key.startswith(f"{name}.")}))
         return found[0], found[1]
 
+    def agreement(self, place: int) -> float:
+        """How well both halves agree about the term number ``place``: energy of its own force over that of the difference.
+
+        Its own force is what no other parameter of the model brings about. The logarithm of that ratio; 0 where there is no
+        such force, or bounds alone make both say the same.
+        """
+        fit = self.state.fit
+        own = self.asked.without(place).residual - fit.residual
+        values = [half.parameters for half in self.of(place)]
+        of_term = [k for k, name in enumerate(fit.names) if name in values[0]]
+        apart = np.array([(values[0][fit.names[k]] - values[1][fit.names[k]]) / fit.scale[k] for k in of_term])
+        others = fit.jacobian[:, [k for k in range(len(fit.names)) if k not in of_term]]
+        change = fit.jacobian[:, of_term] @ apart
+        change -= others @ np.linalg.lstsq(others, change, rcond=None)[0]
+        energy, differs = float(own @ own), float(change @ change)
+        return math.log(energy / differs) if energy > 0.0 and differs > 0.0 else 0.0
+
     def least(self, place: int) -> float:
         """The smaller of what both say for the term number ``place`` [nats]."""
         return min(half.nats for half in self.of(place))

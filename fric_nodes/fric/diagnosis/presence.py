@@ -68,7 +68,8 @@ def presences(
         least = min(each.nats for each in halves)
         functions = judged.asked.nats(place)
         rivals = _among_rivals(step, independent)
-        evidence = Evidence(shares[step.term], unexplained, least, functions, rivals, margin_of(step), complete)
+        agreement = judged.agreement(place)
+        evidence = Evidence(shares[step.term], unexplained, least, functions, rivals, margin_of(step), complete, agreement)
         sure = calibration().probability(step.term.split("#")[0], evidence)
         found[step.term] = Presence(round(sure, 4), halves, evidence)
     return found
