@@ -75,7 +75,8 @@ def test_halves_agree_about_what_is_there(found: dict[str, Presence]) -> None:
     # Nothing else in the model does what a ripple does: its own force is all of it, and so is the difference.
     place = 2.0 * np.pi * np.linspace(0.0, 0.3, 3001)
     force = [
-        each["ripple.cosine"] * np.cos(place / each["ripple.period"]) + each["ripple.sine"] * np.sin(place / each["ripple.period"])
+        each["ripple.cosine"] * np.cos(place / each["ripple.period"])
+        + each["ripple.sine"] * np.sin(place / each["ripple.period"])
         for each in (one, other)
     ]
     ratio = np.sum(np.mean(force, axis=0) ** 2) / np.sum((force[0] - force[1]) ** 2)

@@ -19,8 +19,7 @@ __all__ = ["FORMAT", "Calibration", "Evidence", "calibration", "measures_of"]
 
 FORMAT = "fric-calibration/1"
 _LEAST = 1e-3  # numerical: of a share, whose logarithm is taken
-_MARGIN = 7.0  # numerical: a rival that leaves a thousand times more is out
-_AGREES = 7.0  # numerical: halves that differ by 3 % of the force agree
+_FAR = 7.0  # numerical: logarithm of a ratio: a rival that leaves a thousand times more is out, halves 3 % apart agree
 _SURE = 12.0  # numerical: logarithm of odds, beyond which nothing is surer
 
 
@@ -37,6 +36,8 @@ class Evidence:
         rivals: probability of the effect among itself and what was fitted in its place.
         margin: logarithm of what the best of these leaves over what the effect leaves.
         complete: True where the effects named are a full explanation, so that nothing unknown is said beside them.
+        agreement: logarithm of the energy of the effect's own force over that of the difference between what both halves tell
+            of it; 0 where that was not asked.
     """
 
     share: float
@@ -60,9 +61,9 @@ def measures_of(evidence: Evidence) -> dict[str, float]:
         "halves": _signed(evidence.halves),
         "functions": _signed(evidence.functions),
         "rivals": math.log(min(max(evidence.rivals, _LEAST), 1.0)),
-        "margin": min(max(evidence.margin, 0.0), _MARGIN),
+        "margin": min(max(evidence.margin, 0.0), _FAR),
         "complete": float(evidence.complete),
-        "agreement": min(max(evidence.agreement, -_AGREES), _AGREES),
+        "agreement": min(max(evidence.agreement, -_FAR), _FAR),
     }
 
 
