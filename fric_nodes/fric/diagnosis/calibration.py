@@ -89,7 +89,7 @@ class Calibration:
     def probability(self, effect: str, evidence: Evidence) -> float:
         """That the effect with the id ``effect`` is there and none of its rivals, 0 to 1."""
         odds = self.offset + self.effects.get(effect, 0.0)
-        odds += sum(self.weights.get(name, 0.0) * value for name, value in measures_of(evidence).items())
+        odds += sum(self.weights[name] * value for name, value in measures_of(evidence).items())
         return 1.0 / (1.0 + math.exp(-min(max(odds, -_SURE), _SURE)))
 
 
