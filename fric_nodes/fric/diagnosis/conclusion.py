@@ -23,6 +23,7 @@ from .findings import (
     unlearnt_finding,
     with_presences,
 )
+from .going_with_motion import only_noise
 from .growth import Growth, without_nothings
 from .held_back import OnlyThere, only_there
 from .indifference import dearer
@@ -73,6 +74,10 @@ _TOO_LITTLE = (
     f"the refitted model gives the force to within a thousandth of it (an NOE below {_NEGLIGIBLE:g} %): physics that changes "
     "less is not looked for"
 )
+_NOISE = (
+    "the refitted model leaves a little more than noise from sample to sample explains, and it doesn't go with the motion: "
+    "taken for noise of the force at low frequencies"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +95,7 @@ class _Judged:
         told: whether more is missing than steps of any simulation differ by.
         learnt: whether something is missing in the recordings learnt from.
         missing: whether something is missing in either.
+        noise: whether something would be, if it weren't noise of the force at low frequencies.
         seen_rest: share of it that stays in those held back.
     """
 
@@ -104,6 +110,7 @@ class _Judged:
     told: bool
     learnt: bool
     missing: bool
+    noise: bool
     seen_rest: float
 
     @property
@@ -183,7 +190,7 @@ def concluded(
         refit=seen.begin.model,
         given=nominal,
         prediction=tuple(predictions_of(validation, held, seen.left)),
-        notes=(*corrected, *notes, *([] if seen.told else [_TOO_LITTLE])),
+        notes=(*corrected, *notes, *([] if seen.told else [_TOO_LITTLE]), *([_NOISE] if seen.noise else [])),
         bandwidth=held.bandwidth,
         grown=growth_told(growth),
         only_held_back=alone is not None,
@@ -252,12 +259,14 @@ def _judged(validation: Sequence[Record], whole: Sequence[Track], nominal: Model
         growth = replace(growth, end=growth.begin, steps=(), rejected=gone, beyond=0.0)
         end, left["augmented"] = begin.model, left["refit"]
         scored = replace(scored, noe_augmented=noe["refit"])
+    noise = missing and not growth.steps and only_noise(track, begin.model)
+    missing = missing and not noise
     # Floors of few twins are known to a tenth or two of themselves, no better.
     sure = noise_floor * FLOOR_KNOWN + 200.0 * float(np.std([each @ each for each in floor])) / spread
     minded = dearer(held, end) * scored.noe_augmented
     seen_rest = max(minded - noise_floor - sure, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
     seen_rest *= held.unpaid(begin.model) if end.has_slip_dynamics else 1.0
-    return _Judged(growth, held, track, begin, end, left, floor, scored, told, learnt, missing, seen_rest)
+    return _Judged(growth, held, track, begin, end, left, floor, scored, told, learnt, missing, noise, seen_rest)
 
 
 def _doubts(seen: _Judged, searched: Sequence[Track], findings: Sequence[Finding]) -> _Doubts:

@@ -22,6 +22,7 @@ from .twin import twins
 
 __all__ = [
     "NOTHING",
+    "N_TWINS",
     "Beginning",
     "State",
     "added",
@@ -42,7 +43,8 @@ __all__ = [
 
 NOTHING = 0.35
 """Share of the floor: nothing is missing when less than this is left above it."""
-_TWINS = 3
+N_TWINS = 3
+"""Statistical: twins that a floor is reckoned from."""
 _CLEAR = 25.0  # times the floor
 _ASTRAY = 4.0  # times the floor of a simpler model
 _INFLATION = 2.0
@@ -94,7 +96,7 @@ def free_names(model: Model) -> tuple[str, ...]:
 def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
     """``model`` fitted to the track, and what it leaves."""
     fit = track.fit(model, free_names(model), max_iterations, bounds_of(model, scales_of(track)))
-    made = twins(track, fit.model, _TWINS)
+    made = twins(track, fit.model, N_TWINS)
     chance = tuple(track.residual(fit.model, twin) for twin in made)
     floor = float(np.mean([unseen(track, fit, each) for each in chance]))
     return State(fit, left_by(track, fit), floor, chance)

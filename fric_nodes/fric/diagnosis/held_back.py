@@ -17,15 +17,14 @@ from ..model import Model
 from ..record import Array, Record
 from .candidates import candidates, scales_of
 from .component import Signature, signatures
-from .fitting import refit
+from .fitting import N_TWINS, refit
+from .going_with_motion import only_noise
+from .growth import NAMELESS
 from .screen import Tried, screen
 from .track import Track
 from .twin import twins
 
 __all__ = ["OnlyThere", "only_there"]
-
-_CLEARLY = 0.75  # of the floor: of 500 recordings without physics left out none lacked half of it above the floor
-_TWINS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ def only_there(train: Sequence[Record], validation: Sequence[Record], held: Trac
         return None
     everything = Track.of((*train, *validation), held.bandwidth, begin, held.late)
     state = refit(everything, begin)
-    if not _lacks(held, state.fit.model):
+    if not _lacks(held, state.fit.model) or only_noise(held, state.fit.model):
         return None
     offered = candidates(state.fit.model, scales_of(everything))
     tried = screen(everything, state.fit, offered, state.chance, in_pairs=False).tried
@@ -69,8 +68,8 @@ def only_there(train: Sequence[Record], validation: Sequence[Record], held: Trac
 def _lacks(held: Track, model: Model) -> bool:
     """Whether ``held`` shows clearly that something is missing in ``model``."""
     left = held.residual(model)
-    floor = float(np.mean([_energy(held.residual(model, twin)) for twin in twins(held, model, _TWINS)]))
-    return _energy(left) > (1.0 + _CLEARLY) * floor
+    floor = float(np.mean([_energy(held.residual(model, twin)) for twin in twins(held, model, N_TWINS)]))
+    return _energy(left) > (1.0 + NAMELESS) * floor
 
 
 def _energy(residual: Array) -> float:

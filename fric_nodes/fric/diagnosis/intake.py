@@ -8,6 +8,8 @@ import numpy as np
 
 from ..instrument import Correction, inspect
 from ..instrument import Finding as Check
+from ..instrument.lines import error_again
+from ..instrument.view import View
 from ..model import Model
 from ..record import Array, Record
 from ..signals.resolution import noise_of
@@ -84,8 +86,10 @@ def without_faults(
             continue  # where an encoder's lines lie is known only to the recording that shows them
         if check.recording is None or sum(each.check == check.check for each, _ in wrong) == len(held):
             of_all.setdefault(check.check, correction)
+    own_checks = [[each for each in checks if each.recording in (k, None)] for k in range(len(train))]
     for k, record in enumerate(validation):
         seen = inspect([record], nominal)
+        own_checks.append(list(seen))
         right = {check.check for check in seen if check.verdict == "ok"}
         for name, correction in of_all.items():
             if name in right:
@@ -97,7 +101,34 @@ def without_faults(
             if own is not None and check.check not in of_all:
                 kept_apart[k] = own.apply(kept_apart[k])
                 notes.append(f"corrected in {record.source} alone: {own.text} ({check.detail})")
-    return held, kept_apart, notes
+    both, known = _without_known_lines([*held, *kept_apart], own_checks)
+    return both[: len(held)], both[len(held) :], [*notes, *known]
+
+
+def _without_known_lines(records: Sequence[Record], checks: Sequence[Sequence[Check]]) -> tuple[list[Record], list[str]]:
+    """``records`` without the error within an encoder's lines in those that don't show it by themselves, and notes.
+
+    All are of one encoder: what it errs by is known where any of them shows it.
+
+    Args:
+        records: corrected by what each of them shows.
+        checks: of each of them.
+    """
+    held = list(records)
+    notes: list[str] = []
+    lines = [check for own in checks for check in own if check.check == "interpolation"]
+    shown = [check.correction.position_error for check in lines if check.correction and check.correction.position_error]
+    if not shown:
+        return held, notes
+    largest = max(shown, key=lambda error: error.amplitude)
+    for k, (record, line) in enumerate(zip(records, lines, strict=True)):
+        moves_itself = line.verdict == "ok" and line.value > 0.0
+        error = None if line.correction or moves_itself else error_again(View(record), largest)
+        if error is not None:
+            correction = Correction(position_error=error)
+            held[k] = correction.apply(record)
+            notes.append(f"corrected in {record.source}, too: {correction.text}")
+    return held, notes
 
 
 def _correction_of(check: Check) -> Correction | None:

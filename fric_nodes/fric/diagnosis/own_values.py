@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 from scipy.stats import f as f_ratio
@@ -104,7 +103,7 @@ class Own:
     minded: float
 
     @classmethod
-    def of(cls, track: Track, state: State) -> Self:
+    def of(cls, track: Track, state: State) -> Own:
         """The fitted model of ``state``, all of whose values are shared."""
         fit = state.fit
         values = np.array([*(fit.model.value(name) for name in fit.names), 1.0])

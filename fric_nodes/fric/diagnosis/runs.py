@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from ..signals.resolution import noise_of, step_of
 from .motion import SMOOTH, Motion, Past, motion_of
 
 __all__ = ["SETTLING", "SMOOTH_LED", "Runs"]
+
+Same = TypeVar("Same", bound="Runs")
 
 SMOOTH_LED = 2.0
 """Numerical, times the observer's bandwidth [rad/s]: cutoff of the motion that leads a contact.
@@ -71,7 +73,7 @@ class Runs:
     noticeable: tuple[float, float] | None = None
 
     @classmethod
-    def of(cls, records: Sequence[Record], bandwidth: float, model: Model, late: float = 0.0) -> Self:
+    def of(cls: type[Same], records: Sequence[Record], bandwidth: float, model: Model, late: float = 0.0) -> Same:
         """Follow ``records`` with ``bandwidth`` [rad/s]; the inertia of ``model`` sets the scale."""
         runs: list[Run] = []
         time: list[Array] = []
@@ -100,7 +102,7 @@ class Runs:
             late,
         )
 
-    def parts(self, spans: Sequence[tuple[int, int, int]]) -> Self:
+    def parts(self: Same, spans: Sequence[tuple[int, int, int]]) -> Same:
         """The parts of the recordings in ``spans``: run, first and last interval (exclusive) of each."""
         runs, time, leads, pasts = [], [], [], []
         for k, first, last in spans:

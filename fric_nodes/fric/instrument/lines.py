@@ -26,7 +26,7 @@ from scipy.ndimage import gaussian_filter1d, median_filter, minimum_filter1d
 from ..record import Array
 from .view import View
 
-__all__ = ["Line", "PositionError", "error_found", "share_of_sensor"]
+__all__ = ["Line", "PositionError", "error_again", "error_found", "share_of_sensor"]
 
 _HARMONICS = (1, 2)
 _FEWEST_LINES = 5.0  # in the travel: fewer are a shape of it
@@ -37,6 +37,7 @@ _FINER = np.linspace(-1.0, 1.0, 41)  # places of the spectrum to either side, wh
 _PEAKS = 3
 _BANDS = 24  # parts of a recording, or of its frequencies, that err independently
 _AGAIN = 3.0  # standard errors
+_ALIKE = 0.3  # of its amplitude, by which that of an error may differ in another recording
 _SLOWER = 0.1  # times the band of a clean position: what else moves the axis there counts by its weight
 _ROUNDS = 3  # of weights
 _HIGHEST = 0.4  # of the rate: above it differences of samples are no derivatives
@@ -101,7 +102,7 @@ def error_found(view: View) -> PositionError | None:
         return None
     # Lines may pass faster than samples come: they add up over the position all the same.
     fastest = 1.0 / max(_STEPS * view.resolution, _STEPS * view.noise)  # lines per position
-    lowest = max(_FEWEST_LINES / view.travel, view.cutoff / view.speed)
+    lowest = _lowest(view)
     if fastest <= lowest:
         return None
     position = view.even.position
@@ -111,6 +112,24 @@ def error_found(view: View) -> PositionError | None:
     fitted = [_fitted(view, fast, pitch) for pitch in candidates.values() if 1.0 / pitch >= 0.5 * lowest]
     error, energy = max(fitted, key=lambda each: each[1], default=(None, 0.0))
     return error if energy > 0.0 else None
+
+
+def error_again(view: View, shown: PositionError) -> PositionError | None:
+    """The error ``shown`` by another recording of the same encoder; None where it isn't found again with about its size.
+
+    What is known to be there needs less to be seen than what is looked for among all pitches. Where the lines lie is another
+    matter: an encoder may count from where it was switched on.
+    """
+    if not view.moves or 2.0 / shown.pitch < _lowest(view):  # the second harmonic at least is faster than the motion
+        return None
+    position = view.even.position
+    error, energy = _fitted(view, position - view.low_pass(position), shown.pitch, surely=1.0)
+    return error if energy > 0.0 and abs(error.amplitude - shown.amplitude) < _ALIKE * shown.amplitude else None
+
+
+def _lowest(view: View) -> float:
+    """Lines per position [1/x] that there must be, for their error to be no part of the motion."""
+    return max(_FEWEST_LINES / view.travel, view.cutoff / view.speed)
 
 
 def _peaks(position: Array, fast: Array, travel: float, lowest: float, fastest: float) -> list[float]:
@@ -136,11 +155,12 @@ def _peaks(position: Array, fast: Array, travel: float, lowest: float, fastest: 
     return found
 
 
-def _fitted(view: View, fast: Array, pitch: float) -> tuple[PositionError, float]:
+def _fitted(view: View, fast: Array, pitch: float, surely: float = _AGAIN) -> tuple[PositionError, float]:
     """The error of ``pitch`` that fits what is faster than the motion best, and the energy it explains [x^2].
 
-    Nothing, where parts of the recording don't find it again in each other. Samples count where at least two come to a line:
-    at a steady speed the steps of an encoder beat with the samples, and the beat repeats over the position, too.
+    Nothing, where parts of the recording don't find it again in each other, by ``surely`` standard errors. Samples count where
+    at least two come to a line: at a steady speed the steps of an encoder beat with the samples, and the beat repeats over the
+    position, too.
     """
     at = np.flatnonzero(view.moving & view.usable & (np.abs(view.velocity) * view.h < 0.5 * pitch))
     columns = np.column_stack([each - view.low_pass(each) for each in _columns(view.even.position, pitch).T])[at]
@@ -154,7 +174,7 @@ def _fitted(view: View, fast: Array, pitch: float) -> tuple[PositionError, float
     values = np.linalg.pinv(gram.sum(axis=0), hermitian=True) @ moment.sum(axis=0)
     n = len(_HARMONICS)
     error = PositionError(pitch, tuple(values[:n].tolist()), tuple(values[n:].tolist()))
-    again = float(np.mean(gain)) > _AGAIN * float(np.std(gain)) / math.sqrt(_BANDS)
+    again = float(np.mean(gain)) > surely * float(np.std(gain)) / math.sqrt(_BANDS)
     return error, float(values @ moment.sum(axis=0)) if again else 0.0
 
 

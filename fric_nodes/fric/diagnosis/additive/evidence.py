@@ -16,6 +16,7 @@ rows over the number of rows, from the autocorrelation of the residuals (Bartlet
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,9 +70,6 @@ class Grouped:
         left, values, _ = np.linalg.svd(scaled, full_matrices=False)
         self._basis: Array = left[:, values > _RIDGE]
         self.n = int(target.shape[0]) - self._basis.shape[1]
-        beside = self._beside(target)
-        self.size = float(np.sqrt(np.mean(beside**2))) or 1.0
-        self.y = beside / self.size
         self.names = tuple(groups)
         self._spans: dict[str, slice] = {}
         self._sizes: dict[str, float] = {}
@@ -84,12 +82,29 @@ class Grouped:
         self.x = np.concatenate(parts, axis=1)
         self._gram = self.x.T @ self.x
         self._factors: dict[str, Array] = {}
+        self._explain(target)
+
+    def of(self, target: Array) -> Grouped:
+        """The same base and groups for another ``target``, shape ``(n,)``."""
+        other = copy(self)
+        other._explain(target)
+        return other
+
+    def _explain(self, target: Array) -> None:
+        beside = self._beside(target)
+        self.size = float(np.sqrt(np.mean(beside**2))) or 1.0
+        self.y = beside / self.size
         self._load = self.x.T @ self.y
         self._power = float(self.y @ self.y)
 
     def _beside(self, values: Array) -> Array:
         """``values`` without what the base explains of them."""
         return np.asarray(values - self._basis @ (self._basis.T @ values), dtype=np.float64)
+
+    def explained_by_all(self) -> float:
+        """Share of the target's energy beside the base that all groups explain at the sizes of largest evidence [1]."""
+        left = self.y - self.x @ self.weighed(self.names).weights
+        return 1.0 - float(left @ left) / max(self._power, 1e-300)
 
     def own(self, name: str) -> float:
         """Share of the energy of a group's columns that the base doesn't explain [1]."""
