@@ -33,7 +33,7 @@ class Found:
         }
 
 
-def diagnose(train, validation, nominal, progress=None):
+def diagnose(train, validation, nominal, progress=None, at_most=None):
     if train[0].n_samples % 2:
         raise ValueError("an odd number of <samples>")
     return Found(validation)
@@ -81,6 +81,13 @@ def test_an_examination_from_seed_to_page(tmp_path: Path, entry: str) -> None:
     assert again.hash_of_key == held.hash_of_key
     assert (out / "cases" / "0000" / "done.json").stat().st_mtime_ns == stamp
     assert (out / "cases" / "0001" / "done.json").exists()
+
+    # Under another limit of time every case is diagnosed anew.
+    limited = hold(3, 2, out, jobs=1, entry=entry, at_most=5.0)
+    assert limited.hash_of_key == held.hash_of_key
+    assert all(json.loads(at.read_text())["at_most"] == 5.0 for at in (out / "cases").glob("*/done.json"))
+    with pytest.raises(InputError, match="time"):
+        hold(3, 2, out, entry=entry, at_most=-1.0)
 
     with pytest.raises(InputError, match="another examination"):
         hold(4, 2, out, entry=entry)

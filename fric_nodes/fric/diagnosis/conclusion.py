@@ -95,8 +95,8 @@ class _Judged:
         told: whether more is missing than steps of any simulation differ by.
         learnt: whether something is missing in the recordings learnt from.
         missing: whether something is missing in either.
-        noise: whether something would be, if it weren't noise of the force at low frequencies.
         seen_rest: share of it that stays in those held back.
+        noise: whether something would be missing, if it weren't noise of the force at low frequencies.
     """
 
     growth: Growth
@@ -110,8 +110,13 @@ class _Judged:
     told: bool
     learnt: bool
     missing: bool
-    noise: bool
     seen_rest: float
+    noise: bool = False
+
+    @property
+    def notes(self) -> list[str]:
+        """On what is left, where that is no mismatch."""
+        return [*([] if self.told else [_TOO_LITTLE]), *([_NOISE] if self.noise else [])]
 
     @property
     def rest(self) -> float:
@@ -161,11 +166,9 @@ def concluded(
         growth: of the model.
     """
     seen = _judged(validation, whole, nominal, growth)
-    growth, held, scales, fast = seen.growth, seen.held, scales_of(seen.held), locating(validation, seen.held, seen.growth)
-    findings = [finding_of(fast, held, growth, seen.end, step, seen.scored, scales, seen.rest) for step in growth.steps]
-    # What explains most comes first, as far as it is sure to: what mends the form of another's law may be as sure.
-    findings.sort(key=lambda each: -each.confidence * each.share)
-    doubts = _doubts(seen, searched, findings)
+    fast = locating(validation, seen.held, seen.growth)
+    seen, findings, doubts = _explained(seen, fast, searched)
+    growth, held, scales = seen.growth, seen.held, scales_of(seen.held)
     alone = None if seen.learnt or not seen.told else only_there(train, validation, held, seen.begin.model)
     unknown, unexplained, remains = _rest(seen, doubts, alone, findings, scales)
     findings = _surely(seen, unexplained, unknown, findings)
@@ -190,7 +193,7 @@ def concluded(
         refit=seen.begin.model,
         given=nominal,
         prediction=tuple(predictions_of(validation, held, seen.left)),
-        notes=(*corrected, *notes, *([] if seen.told else [_TOO_LITTLE]), *([_NOISE] if seen.noise else [])),
+        notes=(*corrected, *notes, *seen.notes),
         bandwidth=held.bandwidth,
         grown=growth_told(growth),
         only_held_back=alone is not None,
@@ -198,6 +201,25 @@ def concluded(
         fitted_on=tuple(record.source for record in train),
         tested_on=tuple(record.source for record in validation),
     )
+
+
+def _explained(seen: _Judged, fast: Track, searched: Sequence[Track]) -> tuple[_Judged, list[Finding], _Doubts]:
+    """What is missing by effect, and whether they are a full explanation; nothing is missing where noise passes for it.
+
+    Args:
+        seen: of the recordings held back.
+        fast: these, as an observer follows them that tells where something is missing.
+        searched: recordings that the model was grown on.
+    """
+    growth, scales = seen.growth, scales_of(seen.held)
+    findings = [finding_of(fast, seen.held, growth, seen.end, step, seen.scored, scales, seen.rest) for step in growth.steps]
+    # What explains most comes first, as far as it is sure to: what mends the form of another's law may be as sure.
+    findings.sort(key=lambda each: -each.confidence * each.share)
+    doubts = _doubts(seen, searched, findings)
+    if doubts.unknown and only_noise(seen.track, seen.begin.model):
+        seen = _without_noise(seen)
+        return seen, [], _doubts(seen, searched, [])
+    return seen, findings, doubts
 
 
 def _rest(
@@ -259,14 +281,22 @@ def _judged(validation: Sequence[Record], whole: Sequence[Track], nominal: Model
         growth = replace(growth, end=growth.begin, steps=(), rejected=gone, beyond=0.0)
         end, left["augmented"] = begin.model, left["refit"]
         scored = replace(scored, noe_augmented=noe["refit"])
-    noise = missing and not growth.steps and only_noise(track, begin.model)
-    missing = missing and not noise
     # Floors of few twins are known to a tenth or two of themselves, no better.
     sure = noise_floor * FLOOR_KNOWN + 200.0 * float(np.std([each @ each for each in floor])) / spread
     minded = dearer(held, end) * scored.noe_augmented
     seen_rest = max(minded - noise_floor - sure, 0.0) / max(scored.noe_refit - noise_floor, 1e-300)
     seen_rest *= held.unpaid(begin.model) if end.has_slip_dynamics else 1.0
-    return _Judged(growth, held, track, begin, end, left, floor, scored, told, learnt, missing, noise, seen_rest)
+    return _Judged(growth, held, track, begin, end, left, floor, scored, told, learnt, missing, seen_rest)
+
+
+def _without_noise(seen: _Judged) -> _Judged:
+    """The verdict ``seen`` where what the nominal model lacks is noise: nothing is missing, and no effect explains it."""
+    growth, noe = seen.growth, seen.scored.noe_refit
+    gone = tuple((step.term.split("#")[0], "what it explains doesn't go with the motion") for step in growth.steps)
+    growth = replace(growth, end=growth.begin, steps=(), rejected=(*growth.rejected, *gone), beyond=0.0)
+    left = {**seen.left, "augmented": seen.left["refit"]}
+    scored = replace(seen.scored, noe_augmented=noe)
+    return replace(seen, growth=growth, end=seen.begin.model, left=left, scored=scored, missing=False, noise=True)
 
 
 def _doubts(seen: _Judged, searched: Sequence[Track], findings: Sequence[Finding]) -> _Doubts:

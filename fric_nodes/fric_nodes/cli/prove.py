@@ -33,6 +33,19 @@ class Injections:
     ] = 10
 
 
+@dataclass(frozen=True)
+class Effort:
+    """Worker processes, one per core when None, and the time after which a diagnosis looks for nothing more [s], if any."""
+
+    jobs: int | None
+    at_most: float | None
+
+    @property
+    def words(self) -> str:
+        """The option that changes what is found, with a blank before it."""
+        return "" if self.at_most is None else f" --at-most {self.at_most:g}"
+
+
 InjectionsGroup = Annotated[Injections, Group("Effects concealed in recordings")]
 """What is concealed, as a parameter of a command."""
 
@@ -59,6 +72,13 @@ def prove(
         ),
     ] = "standard",
     jobs: Annotated[int | None, typer.Option("--jobs", help="Number of processes. If not given: one per core.")] = None,
+    at_most: Annotated[
+        float | None,
+        typer.Option(
+            "--at-most",
+            help="After this time, in s, each diagnosis looks for no further effects. If not given: until nothing more helps.",
+        ),
+    ] = None,
     inject: Annotated[
         list[Path] | None,
         typer.Option("--inject", help="Conceal effects in this recording instead of simulated axes. May be repeated."),
@@ -82,25 +102,26 @@ def prove(
         _calibrate(calibrate, out)
         return
     if inject or model is not None:
-        _inject(inject or [], model, injections, jobs, reading, out, as_json)
+        _inject(inject or [], model, injections, Effort(jobs, at_most), reading, out, as_json)
         return
-    _examine(cases, seed, variant, jobs, out, as_json)
+    _examine(cases, seed, variant, Effort(jobs, at_most), out, as_json)
 
 
-def _examine(cases: int, seed: int, variant: str, jobs: int | None, out: Path, as_json: bool) -> None:
+def _examine(cases: int, seed: int, variant: str, effort: Effort, out: Path, as_json: bool) -> None:
     """Simulated axes; the page and ``scores.json`` go into ``out``."""
     from fric.diagnosis.prove.examination import hold
     from fric.files import write_text
     from fric.report.prove import prove_page
 
-    held = hold(cases, seed, out, variant=variant, jobs=jobs, progress=progress)
+    held = hold(cases, seed, out, variant=variant, jobs=effort.jobs, at_most=effort.at_most, progress=progress)
     name = "" if variant == "standard" else f" --variant {variant}"
-    command = f"fric prove --cases {cases} --seed {seed}{name} --out {out.name}"
+    command = f"fric prove --cases {cases} --seed {seed}{name}{effort.words} --out {out.name}"
     write_text(out / "index.html", prove_page(held, command))
     result = {
         "cases": cases,
         "seed": seed,
         "variant": variant,
+        "at_most": effort.at_most,
         "key_sha256": held.hash_of_key,
         "seconds": held.seconds,
         "figures": [
@@ -152,7 +173,7 @@ def _inject(
     recordings: list[Path],
     model: Path | None,
     asked: Injections,
-    jobs: int | None,
+    effort: Effort,
     reading: Reading,
     out: Path,
     as_json: bool,
@@ -169,8 +190,8 @@ def _inject(
         )
     wanted = _wanted(asked.sizes, asked.only)
     records = read_all(recordings, reading)
-    bare, outcomes = examined(records, read_model(model), wanted, asked.blocks, out, progress, jobs)
-    command = _command(recordings, model, asked, reading, out)
+    bare, outcomes = examined(records, read_model(model), wanted, asked.blocks, out, progress, effort.jobs, effort.at_most)
+    command = _command(recordings, model, asked, effort, reading, out)
     write_text(out / "injection.html", injection_page(bare, outcomes, command))
     result = {
         "found": sum(each.found for each in outcomes),
@@ -222,10 +243,11 @@ def _wanted(sizes: str, only: str) -> list[Injected]:
     return [each for each in every if not names or each.effect in names]
 
 
-def _command(recordings: list[Path], model: Path, asked: Injections, reading: Reading, out: Path) -> str:
+def _command(recordings: list[Path], model: Path, asked: Injections, effort: Effort, reading: Reading, out: Path) -> str:
     """What makes the page again, with the names of files alone."""
     words = ["fric prove", *(f"--inject {each.name}" for each in recordings), f"--model {model.name}"]
     words += [f"--sizes {asked.sizes}", f"--blocks {asked.blocks}", *([f"--only {asked.only}"] if asked.only else [])]
+    words += [effort.words.strip()] if effort.words else []
     words += ["--repair"] if reading.repair else []
     words += [f"--time {reading.time}"] if reading.time != "stamp" else []
     given = {"--joint": reading.joint, "--start": reading.start, "--end": reading.end}

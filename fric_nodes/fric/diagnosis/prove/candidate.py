@@ -13,6 +13,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -44,7 +45,7 @@ class Diagnosed(Protocol):
         """The content of ``report.json``."""
 
 
-Diagnose = Callable[[Sequence[Record], Sequence[Record], Model], Diagnosed]
+Diagnose = Callable[..., Diagnosed]
 
 
 def entered(entry: str) -> Diagnose:
@@ -67,7 +68,7 @@ def _read(folder: Path, nominal: Model) -> tuple[list[Record], list[Record]]:
     ]
 
 
-def examine(folder: str, seal: str, entry: str = DIAGNOSE) -> float:
+def examine(folder: str, seal: str, entry: str = DIAGNOSE, at_most: float | None = None) -> float:
     """Diagnose the case in ``folder`` and write what was found; the time it took [s].
 
     A diagnosis that fails counts as one that said nothing: the failure is written down and scored.
@@ -75,7 +76,7 @@ def examine(folder: str, seal: str, entry: str = DIAGNOSE) -> float:
     at = Path(folder)
     nominal = read_model(at / "nominal.yaml")
     train, validation = _read(at, nominal)
-    diagnose = entered(entry)
+    diagnose = entered(entry) if at_most is None else partial(entered(entry), at_most=at_most)
     began = time.perf_counter()
     failure = ""
     try:
@@ -89,7 +90,7 @@ def examine(folder: str, seal: str, entry: str = DIAGNOSE) -> float:
     except Exception as error:  # whatever goes wrong in it is a result of the examination, not its end
         failure = f"{type(error).__name__}: {error}"
     seconds = time.perf_counter() - began
-    write_text(at / "done.json", json.dumps({"seal": seal, "seconds": seconds, "failure": failure}))
+    write_text(at / "done.json", json.dumps({"seal": seal, "seconds": seconds, "failure": failure, "at_most": at_most}))
     return seconds
 
 
@@ -113,7 +114,7 @@ def _reference(entry: str, model: Model, train: Sequence[Record], validation: Se
     """By the diagnosis itself, at the bandwidth at which it judged the case; another entry is handed the true structure."""
     if entry == DIAGNOSE:
         refit_noe = entered(DIAGNOSE.replace(":diagnose", ":refit_noe"))
-        return float(refit_noe(model, train, validation, report["observer_bandwidth"]))  # type: ignore[call-arg, arg-type]
+        return float(refit_noe(model, train, validation, report["observer_bandwidth"]))  # type: ignore[arg-type]
     return float(entered(entry)(train, validation, model).report()["validation"]["noe_refit"])
 
 

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 from ...errors import InputError
 from ...files import write_text
 from ...threads import alone
+from ..deadline import refuse_no_time
 from .candidate import DIAGNOSE, entered, examine, own_fit
 from .cases import Order, plan
 from .generators import GENERATORS
@@ -50,6 +51,7 @@ def hold(
     variant: str = "standard",
     jobs: int | None = None,
     entry: str = DIAGNOSE,
+    at_most: float | None = None,
     progress: Progress = lambda text: None,
 ) -> Examination:
     """Hold an examination in the folder ``out``.
@@ -61,11 +63,13 @@ def hold(
         variant: see :data:`fric.diagnosis.prove.cases.VARIANTS`.
         jobs: worker processes; as many as there are cores when None.
         entry: the diagnosis, as ``module:function``.
+        at_most: time after which a diagnosis looks for no further effects [s]; None: each ends by itself.
         progress: told what is going on.
 
     Raises:
         InputError: the folder holds something else, or the wishes can't be met.
     """
+    refuse_no_time(at_most)
     began = time.perf_counter()
     orders = plan(n_cases, seed, variant)
     workers = _workers(jobs)
@@ -80,12 +84,12 @@ def hold(
             keys = _all(pool, set_up, [(str(out), order) for order in orders], progress, "drawn")
         hash_of_key = seal(out, keys)
     progress(f"sealed: sha256 {hash_of_key}")
-    waiting = [order for order in orders if not _finished(case_folder(out, order.number), hash_of_key)]
+    waiting = [order for order in orders if not _finished(case_folder(out, order.number), hash_of_key, at_most)]
     if len(waiting) < n_cases:
         progress(f"{n_cases - len(waiting)} cases were diagnosed before")
     # Processes that have drawn a case know what is in it: these are others.
     with _pool(workers) as pool:
-        tasks = [(str(case_folder(out, order.number)), hash_of_key, entry) for order in waiting]
+        tasks = [(str(case_folder(out, order.number)), hash_of_key, entry, at_most) for order in waiting]
         _all(pool, examine, tasks, progress, "diagnosed")
         keys = open_key(out)
         named = [key for key in keys if key["kind"] in ("moderate", "weak", "pair")]
@@ -113,9 +117,10 @@ def _claim(out: Path, orders: Sequence[Order]) -> None:
     write_text(at, text)
 
 
-def _finished(folder: Path, hash_of_key: str) -> bool:
+def _finished(folder: Path, hash_of_key: str, at_most: float | None) -> bool:
     at = folder / "done.json"
-    return at.exists() and json.loads(at.read_text()).get("seal") == hash_of_key
+    done = json.loads(at.read_text()) if at.exists() else {}
+    return done.get("seal") == hash_of_key and done.get("at_most") == at_most
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:

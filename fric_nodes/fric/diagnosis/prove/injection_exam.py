@@ -20,6 +20,7 @@ from ...model_file import model_to_text
 from ...record import Record
 from ..blocks import in_blocks
 from ..confidence import AS_LIKELY
+from ..deadline import refuse_no_time
 from ..diagnose import diagnose
 from ..result import Diagnosis, Finding
 from .examination import in_processes
@@ -63,6 +64,7 @@ def examined(
     out: Path,
     progress: Callable[[str], None],
     jobs: int | None = None,
+    at_most: float | None = None,
 ) -> tuple[Diagnosis, list[InjectionOutcome]]:
     """The diagnosis of ``records`` as they are, and of every injection into them.
 
@@ -74,17 +76,19 @@ def examined(
         out: folder; one that holds the same examination is gone on with.
         progress: told what goes on.
         jobs: worker processes; as many as there are cores when None.
+        at_most: time after which a diagnosis looks for no further effects [s]; None: each ends by itself.
 
     Raises:
-        InputError: the folder holds another examination.
+        InputError: the folder holds another examination, or ``at_most`` is no time.
     """
-    _claim(out, records, nominal, n_blocks)
+    refuse_no_time(at_most)
+    _claim(out, records, nominal, n_blocks, at_most)
     progress("diagnosing the recordings as they are")
-    bare = diagnose(*in_blocks(records, n_blocks), nominal)
+    bare = diagnose(*in_blocks(records, n_blocks), nominal, at_most=at_most)
     own = {each.effect: each.confidence for each in reversed(bare.findings)}
     rest = bare.force_errors[1] if bare.force_errors is not None else 0.0
     waiting = [what for what in wanted if not _at(out, what).exists()]
-    tasks = [(str(_at(out, what)), what, records, nominal, rest, n_blocks, own) for what in waiting]
+    tasks = [(str(_at(out, what)), what, records, nominal, rest, n_blocks, own, at_most) for what in waiting]
     in_processes(_diagnosed, tasks, progress, "diagnosed", jobs)
     return bare, [_outcome(json.loads(_at(out, what).read_text(encoding="utf-8"))) for what in wanted]
 
@@ -102,9 +106,10 @@ def _at(out: Path, what: Injected) -> Path:
     return out / _FOLDER / f"{what.effect}_{what.times:g}.json"
 
 
-def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int) -> None:
+def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int, at_most: float | None) -> None:
     """Write down of what it is, or check that the folder holds the same."""
-    told = hashlib.sha256(f"{model_to_text(nominal)} {n_blocks}".encode())
+    limit = "" if at_most is None else f" {at_most}"
+    told = hashlib.sha256(f"{model_to_text(nominal)} {n_blocks}{limit}".encode())
     for record in records:
         for each in (record.time, record.position, record.effort, record.mask):
             told.update(each.tobytes())
@@ -116,14 +121,21 @@ def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int) 
 
 
 def _diagnosed(
-    at: str, what: Injected, records: Sequence[Record], nominal: Model, rest: float, n_blocks: int, own: Mapping[str, float]
+    at: str,
+    what: Injected,
+    records: Sequence[Record],
+    nominal: Model,
+    rest: float,
+    n_blocks: int,
+    own: Mapping[str, float],
+    at_most: float | None,
 ) -> None:
     """Diagnose ``records`` with ``what`` concealed in them, and write down what was said."""
     changed, rms = injected(records, what, rest)
     failure = ""
     findings: tuple[Finding, ...] = ()
     try:
-        findings = diagnose(*in_blocks(changed, n_blocks), nominal).findings
+        findings = diagnose(*in_blocks(changed, n_blocks), nominal, at_most=at_most).findings
     except InputError as error:
         failure = str(error)
     told = {"injected": asdict(what), "rms": rms, "own": dict(own), "failure": failure, "findings": [*map(_said, findings)]}
