@@ -90,13 +90,27 @@ def test_halves_agree_about_what_is_there_as_far_as_their_values_do(judged: tupl
 
 
 def test_a_machine_that_changes_in_between_makes_its_halves_contradict_each_other() -> None:
-    """A force of 3 N is there in the first and third quarter only: what they say of it the others don't find."""
-    pull = term("bias", force=3.0)
-    track = Track.of([recorded(pull), recorded(seed=1)] * 2, 45.0, NOMINAL)
-    state = refit(track, with_terms(pull))
+    """A ripple of 3 N is there in the first and third quarter only: what they say of it makes the others worse."""
+    ripple = term("ripple", cosine=3.0, sine=0.0, period=0.05)
+    track = Track.of([recorded(ripple), recorded(seed=1)] * 2, 45.0, NOMINAL)
+    state = refit(track, with_terms(ripple))
     halves = Halves(track, state)
-    place = at(state, "bias")
-    first, second = (half.parameters["bias.force"] for half in halves.of(place))
+    place = at(state, "ripple")
+    first, second = (half.parameters["ripple.cosine"] for half in halves.of(place))
     assert (first, second) == (pytest.approx(3.0, abs=0.3), pytest.approx(0.0, abs=0.3))
-    # The force is 1.5 N on average, and 3 N are between what both say.
-    assert halves.agreement(place) == pytest.approx(np.log((1.5 / 3.0) ** 2), abs=0.3)
+    assert halves.least(place) < -10.0
+    # The ripple is 1.5 N on average, and 3 N are between what both say.
+    assert halves.agreement(place) == pytest.approx(np.log((1.5 / 3.0) ** 2), abs=0.5)
+
+
+def test_a_slow_wander_hides_nothing_that_is_fast() -> None:
+    """A wander is foretold from what came before: a ripple as large stands out from what is new, and hardly from all of it."""
+    ripple = term("ripple", cosine=0.8, sine=0.0, period=0.03)
+    made = recorded(ripple, duration=8.0, noise=1e-6)
+    wander = 0.8 * np.sin(0.9 * made.time + 0.4)
+    track = Track.of([replace(made, effort=made.effort + wander)], 45.0, NOMINAL)
+    state = refit(track, with_terms(ripple))
+    by_size = 0.5 * track.independent * np.log(refit(track, NOMINAL).left / state.left)
+    nats = Halves(track, state).least(at(state, "ripple"))
+    assert by_size < 5.0
+    assert nats > 40.0

@@ -94,7 +94,8 @@ def test_where_hardly_anything_is_to_be_beaten_fewer_are_fitted(dragged: tuple[T
     assert set(near) < set(far)
     # The first four take half off of what the best does; what else comes lacks little where its fit begins.
     more = [[offer for offer in offers if len(offer) == 1 and offer[0] not in found.tried[:4]] for offers in (near, far)]
-    assert (0 < len(more[0]) <= 2) and len(more[1]) == 4
+    assert 0 < len(more[0]) <= 2
+    assert len(more[1]) == 4
     laws = [offer[0].column.term.effect.id for offer in more[0]]
     assert len(laws) == len(set(laws))  # of each effect one law
 
