@@ -87,7 +87,7 @@ def test_a_single_term_is_not_compared_again() -> None:
 
 
 def test_a_term_gives_way_to_a_rival_that_explains_more() -> None:
-    """Friction that levels off stood in for the drag while the ripple was missing, too: with both there it is compared again."""
+    """Friction that levels off stood in for the drag while the ripple was missing: with both there it is compared again."""
     stand_in = term("shear_thinning", force=3.0, velocity=0.3)
     track, begin, state = begun(DRAG, RIPPLE, grown=(stand_in, RIPPLE))
     done = Settled(begin, state, tuple(steps_for(begin, state, "shear_thinning", "ripple")), 0.2, ())
