@@ -49,7 +49,7 @@ def test_noise_alone_is_no_term(seed: int) -> None:
 def test_where_the_force_between_samples_is_unsure_nothing_faint_is_told() -> None:
     """What stands out may be that force then."""
     followed = tracks(term("ripple", cosine=0.5, sine=0.0, period=0.045))
-    wide = [tuple(replace(run, between=0.0 * run.effort + 3.0) for run in track.runs) for track in followed]
+    wide = [tuple(replace(run, between=0.0 * run.effort + 0.01) for run in track.runs) for track in followed]
     unsure = [replace(track, runs=runs) for track, runs in zip(followed, wide, strict=True)]
     assert all(track.unsure for track in unsure)
     assert faint_term(unsure, NOMINAL, quietly) is None
