@@ -67,7 +67,10 @@ class Suspects:
 
 @dataclass(frozen=True, eq=False)
 class _Suspect:
-    """An effect, whether the model has it, its component, its columns, and the amplitudes that they are per unit of, if any."""
+    """An effect, whether the model has it, its component, its columns, and the amplitudes that they are per unit of, if any.
+
+    It is a term that would come, or parameters of the model, by their names, with other values.
+    """
 
     effect: str
     known: bool
@@ -77,6 +80,7 @@ class _Suspect:
     n_shapes: int = 0
     left: float = math.inf
     term: Term | None = None
+    names: tuple[str, ...] = ()
 
 
 def prepare_suspects(model: Model) -> None:
@@ -142,7 +146,7 @@ def _present(track: Track, model: Model, missing: Array) -> list[_Suspect]:
     residuals = mapped(track.residual, trials)
     columns = {name: (residual - missing) / step for name, residual, step in zip(names, residuals, steps, strict=True)}
     return [
-        _Suspect(effect, True, component, tuple(columns[name] for name in members), ())
+        _Suspect(effect, True, component, tuple(columns[name] for name in members), (), names=tuple(members))
         for effect, component, members in groups.values()
     ]
 
@@ -178,10 +182,8 @@ def _refined(track: Track, model: Model, ranked: list[_Suspect]) -> list[_Suspec
     missing = track.residual(model)
     energy = float(missing @ missing)
     for k, each in enumerate(near):
-        if each.term is None:
-            continue
-        grown = model.with_terms((*model.terms, _sized(each, each.term, missing)))
-        names = [name for name in free_names(grown) if name not in model.names]
+        grown = model if each.term is None else model.with_terms((*model.terms, _sized(each, each.term, missing)))
+        names = each.names or [name for name in free_names(grown) if name not in model.names]
         fit = track.fit(grown, names, _REFINING, bounds_of(grown, scales_of(track)))
         left = float(fit.residual @ fit.residual) + energy * (_PER_COLUMN * len(each.columns) + _PER_SHAPE * each.n_shapes)
         near[k] = replace(each, left=min(left, each.left))

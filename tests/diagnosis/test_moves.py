@@ -1,0 +1,72 @@
+"""A grown model reconsidered: a term less, another law, other values; on axes whose structure is known."""
+
+from __future__ import annotations
+
+import pytest
+from fric.diagnosis.fitting import State, refit
+from fric.diagnosis.moves import reconsidered
+from fric.diagnosis.track import Track
+from fric.model import Term, term
+
+from .small_axis import NOMINAL, followed, with_terms
+
+DRAG = term("quadratic_drag", coefficient=15.0)
+BENT = term("stribeck", "exponential", force=6.0, velocity=0.15, exponent=1.0)
+"""A surplus that falls as the plain exponential of the speed."""
+ROUND = term("stribeck", "exponential", force=6.0, velocity=0.15, exponent=2.0)
+
+
+def begun(*lacks: Term, grown: tuple[Term, ...]) -> tuple[Track, State, State]:
+    track = followed(*lacks, bandwidth=140.0)
+    return track, refit(track, NOMINAL), refit(track, with_terms(*grown))
+
+
+def moves(track: Track, begin: State, state: State) -> tuple[State, list[str]]:
+    said: list[str] = []
+    return reconsidered(track, begin, state, said.append), said
+
+
+def test_a_term_that_does_nothing_goes_and_the_truth_stays() -> None:
+    track, begin, state = begun(DRAG, grown=(DRAG, term("stiffness", stiffness=0.5, position=0.0)))
+    found, said = moves(track, begin, state)
+    assert found.fit.model.prefixes == (*NOMINAL.prefixes, "quadratic_drag")
+    assert found.fit.model.value("quadratic_drag.coefficient") == pytest.approx(15.0, rel=0.02)
+    assert len(said) == 1
+    assert said[0].startswith("without")
+
+
+def test_the_right_structure_is_not_moved() -> None:
+    track, begin, state = begun(DRAG, grown=(DRAG,))
+    found, said = moves(track, begin, state)
+    assert found is state
+    assert said == []
+
+
+def test_terms_of_the_nominal_model_stay_though_they_do_nothing() -> None:
+    """An axis without viscous friction: its model says that there is some, and finds it at nothing."""
+    bare = NOMINAL.with_terms([term("coulomb", force=4.0), term("viscous", coefficient=20.0), term("bias", force=0.0)])
+    track = followed(DRAG, bandwidth=140.0)
+    begin = refit(track, bare)
+    state = refit(track, bare.with_terms((*bare.terms, DRAG)))
+    assert moves(track, begin, state)[0].fit.model.prefixes == state.fit.model.prefixes
+
+
+def test_a_law_that_is_the_wrong_one_gives_way_and_takes_what_mended_it_along() -> None:
+    """A surplus that falls as exp(-v) by the law exp(-v^2), and a drag that only mended its form."""
+    track, begin, state = begun(BENT, grown=(ROUND, term("asymmetry", force=0.1, coefficient=0.1)))
+    found, _ = moves(track, begin, state)
+    assert set(found.fit.model.prefixes) == {*NOMINAL.prefixes, "stribeck"}
+    assert found.fit.model.value("stribeck.exponent") == 1.0
+    assert found.fit.model.value("stribeck.force") == pytest.approx(6.0, rel=0.1)
+    assert found.fit.model.value("stribeck.velocity") == pytest.approx(0.15, rel=0.1)
+
+
+def test_a_fit_that_ended_in_the_wrong_valley_is_begun_from_elsewhere() -> None:
+    """Friction around one place: a bump four times too wide, held where it is."""
+    bump = term("position_dependence", "local", amplitude=1.0, position=0.08, width=0.01)
+    track, begin, _ = begun(bump, grown=())
+    wide = with_terms(term("position_dependence", "local", amplitude=0.3, position=0.08, width=0.04))
+    stuck = refit(track, wide, max_iterations=0)
+    found, _ = moves(track, begin, stuck)
+    assert found.fit.model.value("position_dependence.width") == pytest.approx(0.01, rel=0.1)
+    assert found.left < 0.05 * stuck.left
