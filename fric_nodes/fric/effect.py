@@ -109,6 +109,7 @@ class Effect:
         usual: True for the law that is meant when a model names none; without one it is the first by file name.
         near: another law of the effect that this one comes so near that a diagnosis tries only that; ``""``: none does.
         form_of: another law of the effect, in whose place alone a diagnosis tries this one; ``""``: it has a place of its own.
+        shows_alone: True for a form that may show where the law that it is a form of hardly does: it is tried by itself, too.
         order: within its place, what comes first: 0 what adds up, 10 what lags, 20 what depends on direction, 30 what scales
             the rest.
         level: see the module's docstring, as for all compiled functions; None when the effect doesn't contribute there.
@@ -146,6 +147,7 @@ class Effect:
     usual: bool = False
     near: str = ""
     form_of: str = ""
+    shows_alone: bool = False
     order: int = 0
     level: Compiled | None = None
     force: Compiled | None = None

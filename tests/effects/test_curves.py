@@ -37,8 +37,8 @@ def test_curves_over_velocity(v: float) -> None:
     assert force("quadratic_drag/power")(v, 3.0, 1.75) == pytest.approx(3.0 * v**2 / abs(v) ** 0.25 * s if v else 0.0)
     assert force("quadratic_drag/power")(s, 3.0, 2.6) == pytest.approx(3.0 * s)  # at 1 x/s whatever the exponent is
     assert force("bias")(v, -3.0) == -3.0
-    assert level("asymmetry")(v, 0.5, 3.0) == 0.5 * s
-    assert force("asymmetry")(v, 0.5, 3.0) == pytest.approx(3.0 * abs(v))
+    assert level("asymmetry/linear")(v, 0.5, 3.0) == 0.5 * s
+    assert force("asymmetry/linear")(v, 0.5, 3.0) == pytest.approx(3.0 * abs(v))
     assert level("stribeck/static")(v, 2.0) == 0.0
     assert level("stribeck/hess_soom")(v, 2.0, 0.01) == pytest.approx(2.0 / (1.0 + (v / 0.01) ** 2), rel=1e-12)
     for delta in (0.5, 1.0, 2.0, 3.7):

@@ -26,7 +26,7 @@ from .motion import smooth
 from .track import Track
 from .worth_trying import worth_trying
 
-__all__ = ["FRICTION", "Candidate", "Scales", "candidates", "fewest_cycles", "scales_of"]
+__all__ = ["FRICTION", "Candidate", "Scales", "candidates", "fewest_cycles", "scales_of", "values_to_try"]
 
 FRICTION = "guideway friction"
 """The component that rubs."""
@@ -159,7 +159,7 @@ def _stops(held: Term, scales: Scales) -> Iterator[Term]:
 
 
 def _values(effect: Effect, scales: Scales) -> Iterator[tuple[float, ...]]:
-    grids = [_grid(effect, parameter, scales) for parameter in effect.parameters]
+    grids = [values_to_try(effect, parameter, scales) for parameter in effect.parameters]
     for values in itertools.product(*grids):
         yield tuple(_with_damping(effect, values, scales))
 
@@ -177,7 +177,8 @@ def _with_damping(effect: Effect, values: Sequence[float], scales: Scales) -> li
     return result
 
 
-def _grid(effect: Effect, parameter: Parameter, scales: Scales) -> Sequence[float]:
+def values_to_try(effect: Effect, parameter: Parameter, scales: Scales) -> Sequence[float]:
+    """Values of a parameter of ``effect`` that a recording of these ``scales`` suggests; a small one for a linear strength."""
     if parameter.name in effect.amplitudes:
         return _amplitudes(parameter, scales)
     if parameter.name == "damping" and parameter.dimension == "1" and parameter.default is not None:

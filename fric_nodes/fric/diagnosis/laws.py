@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from .candidates import scales_of
 from .fitting import State, refit
-from .other_laws import laws_beside, told
+from .other_laws import laws_in_place, told
 from .settle import Step
 from .track import Track
 
@@ -30,7 +30,7 @@ def with_best_laws(track: Track, state: State, steps: Sequence[Step], tell: Call
         model = state.fit.model
         place = list(model.prefixes).index(step.term)
         best = state
-        for term in laws_beside(model.terms[place], scales_of(track)):
+        for term in laws_in_place(track, state.fit, place):
             tried = refit(track, model.with_terms(term if k == place else held for k, held in enumerate(model.terms)))
             if told(tried.fit.model.terms[place], scales_of(track)):
                 best = min(best, tried, key=lambda each: each.left)

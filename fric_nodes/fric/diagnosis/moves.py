@@ -15,16 +15,16 @@ from dataclasses import dataclass
 
 from ..model import Model, Term
 from .candidates import scales_of
+from .costs import NATS_PER_PARAMETER
 from .deadline import is_over
 from .fitting import NOTHING, State, bounds_of, refit, without_place
-from .other_laws import laws_beside, told
+from .other_laws import laws_in_place, told
 from .price import implausible
 from .settle import TO_STAY
 from .track import Track
 
 __all__ = ["reconsidered"]
 
-_PRICE = 4.0  # statistical, nats a parameter: half the logarithm of some thousand independent values (Schwarz's criterion)
 _CLEARLY = 3.0  # statistical, nats: odds of twenty to one; a move that gains less isn't made
 _LAWS = 2  # of the best by themselves, that are also tried with each other term taken away
 _MOVES = 20  # at most: each one gains, so that the search ends anyway
@@ -45,7 +45,7 @@ class _Search:
         left, model = state.left, state.fit.model
         if not math.isfinite(left) or left <= 0.0:
             return -math.inf
-        price = _PRICE * sum(not p.declaration.shape for p in model.parameters())
+        price = NATS_PER_PARAMETER * sum(not p.declaration.shape for p in model.parameters())
         off = max(implausible(self.track.masses, model) - implausible(self.track.masses, self.begin.fit.model), 0.0)
         return -0.5 * self.track.independent * (math.log(left / self.begin.left) + off) - price
 
@@ -109,7 +109,7 @@ class _Search:
         model, scales = self.state.fit.model, scales_of(self.track)
         made: list[tuple[str, int, State]] = []
         for k in self.brought:
-            for law in laws_beside(model.terms[k], scales):
+            for law in laws_in_place(self.track, self.state.fit, k):
                 terms: list[Term] = [law if k == place else held for place, held in enumerate(model.terms)]
                 state = refit(self.track, model.with_terms(terms))
                 if told(state.fit.model.terms[k], scales):

@@ -61,6 +61,7 @@ def offered(track: Track, state: State, found: Screening, scales: Scales, far: b
         laws[effect.id] = laws.get(effect.id, 0) + 1
         if laws[effect.id] <= (_LAWS if far else 1) and sum(laws.values()) <= (_FITTED if far else _FITTED // 2):
             offers.append(offer)
+    offers += [(law,) for law in _laws_of_forms(found, offers) if (law,) not in offers]
     if found.tried and found.pairs:
         single = max(found.tried[0].left - state.floor, 0.05 * state.excess)
         foremost = found.pairs[:_PAIRS_FITTED]
@@ -70,6 +71,14 @@ def offered(track: Track, state: State, found: Screening, scales: Scales, far: b
         begins |= _begun(track, state.fit, pairs, scales, along)
         offers += pairs
     return {offer: begins[offer] for offer in offers if offer in begins}
+
+
+def _laws_of_forms(found: Screening, offers: Sequence[tuple[Tried, ...]]) -> list[Tried]:
+    """The trials of the laws that ``offers`` hold forms of: what a form explains its law may explain nearly as well."""
+    forms = {
+        (each.column.term.effect.id, each.column.term.effect.form_of) for (each,) in offers if each.column.term.effect.form_of
+    }
+    return [each for each in (*found.tried, *found.laws) if (each.column.term.effect.id, each.column.term.effect.law) in forms]
 
 
 def _begun(

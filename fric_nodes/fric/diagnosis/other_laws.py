@@ -1,19 +1,33 @@
-"""Terms of the same effect by other laws, with values that follow from those of the law that is there."""
+"""Terms of the same effect by other laws, with values that follow from those of the law that is there.
+
+A law that is a form of that one may ask for values of which that one says nothing: up to which speed friction differs between
+the directions, where it differs at low speed. Those are tried as the recording suggests them, and the ones that promise most at
+first order are where its fit begins.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
+
+import numpy as np
 
 from ..effect import Effect
 from ..effects import EFFECTS
 from ..model import Term
 from ..parameter import Parameter
-from .candidates import Scales
+from ..record import Array
+from ..threads import mapped
+from .candidates import Scales, scales_of, values_to_try
+from .fitting import with_amplitudes
+from .least_squares import Fit
+from .screen import OWN
+from .track import Track
 from .worth_trying import worth_trying
 
-__all__ = ["laws_beside", "laws_further", "strained", "told"]
+__all__ = ["laws_beside", "laws_further", "laws_in_place", "strained", "told"]
 
 _AT_THE_END = 1e-3  # of the range
 _FOLLOWED = 5.0  # samples, in which sliding elements come after their level
@@ -41,6 +55,61 @@ def laws_beside(held: Term, scales: Scales) -> Iterator[Term]:
             term = _taken_over(law, known, usual)
             yield term
             yield from _shaped(term)
+
+
+def laws_in_place(track: Track, fit: Fit, place: int) -> list[Term]:
+    """What may stand in the place of a term: :func:`laws_beside`, and forms of its law with values that the law doesn't have.
+
+    Args:
+        track: the recordings.
+        fit: of the model.
+        place: number of the term in the model.
+    """
+    held, scales = fit.model.terms[place], scales_of(track)
+    found = list(laws_beside(held, scales))
+    for law in EFFECTS.values():
+        if law.id == held.effect.id and law.form_of == held.effect.law and law.form_of:
+            term = _begun(track, fit, place, list(_suggested(law, held, scales)))
+            found += [] if term is None else [term, *_shaped(term)]
+    return found
+
+
+def _suggested(law: Effect, held: Term, scales: Scales) -> Iterator[Term]:
+    """Terms by ``law`` with a little of the one strength that ``held`` lacks, at each of the values that a recording suggests.
+
+    None where ``held`` says everything that isn't usual anyway.
+    """
+    given = held.by_name
+    if len(_lacking(law, held)) == 1 and any(p.name not in given and p.default is None for p in law.parameters):
+        grids = [(given[p.name],) if p.name in given else values_to_try(law, p, scales) for p in law.parameters]
+        for values in itertools.product(*grids):
+            yield Term(law, tuple(float(value) for value in values))
+
+
+def _lacking(law: Effect, held: Term) -> list[str]:
+    """The strengths that ``law`` has beyond those of ``held``."""
+    return [name for name in law.amplitudes if name not in held.by_name]
+
+
+def _begun(track: Track, fit: Fit, place: int, terms: Sequence[Term]) -> Term | None:
+    """The one of ``terms`` in the place of that of ``fit`` that promises most, as strong as it is at first order, if any."""
+    held = fit.model.terms[place]
+
+    def changed(term: Term) -> Array:
+        (name,) = _lacking(term.effect, held)
+        model = fit.model.with_terms(term if k == place else each for k, each in enumerate(fit.model.terms))
+        return np.asarray((track.residual(model) - fit.residual) / term.by_name[name])
+
+    basis, _ = np.linalg.qr(fit.jacobian / np.maximum(np.linalg.norm(fit.jacobian, axis=0), 1e-300))
+    best, most = None, 0.0
+    for term, column in zip(terms, mapped(changed, terms), strict=True):
+        own = column - basis @ (basis.T @ column)
+        size, along = float(own @ own), float(own @ fit.residual)
+        if size <= OWN**2 * float(column @ column):
+            continue  # the other parameters do the same
+        if along**2 > most * size:
+            best, most = with_amplitudes(term, _lacking(term.effect, held), [-along / size]), along**2 / size
+    return best
 
 
 def strained(held: Term) -> bool:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from ..effect import Effect
 from ..model import Model
+from .costs import PER_PARAMETER, n_free
 from .fitting import State, is_driven
 from .screen import Tried
 
@@ -31,7 +32,6 @@ __all__ = [
 FAR_OFF = 0.1  # of what is missing, for a mass twice or half the one that was given
 _NEAR = 1.2  # times as large or small as the given one, or less
 _LEAST_SHARE = 0.1  # of the mass behind a spring: half of it counts as much as a mass twice the given one
-PER_PARAMETER = 0.012  # of what is missing
 OF_FLOOR = 0.15  # statistical: what a term has to take off, as a share of the floor,
 OF_EXCESS = 0.12  # as a share of what is missing, since less is no explanation,
 BY_CHANCE = 6.0  # and times what candidates take off twins by chance
@@ -39,11 +39,7 @@ BY_CHANCE = 6.0  # and times what candidates take off twins by chance
 
 def price_of(effect: Effect, excess: float) -> float:
     """What the parameters of ``effect`` cost [F^2]."""
-    return PER_PARAMETER * excess * _n_free(effect)
-
-
-def _n_free(effect: Effect) -> int:
-    return sum(not p.shape for p in effect.parameters)
+    return PER_PARAMETER * excess * n_free(effect)
 
 
 def implausible(masses: Sequence[float], model: Model) -> float:

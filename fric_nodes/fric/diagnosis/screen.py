@@ -23,6 +23,7 @@ from ..record import Array, Index
 from ..threads import mapped
 from .along import Along
 from .candidates import Candidate
+from .costs import PER_PARAMETER, further_parameters
 from .fine import fine_periods
 from .least_squares import Fit
 from .track import Track
@@ -321,6 +322,7 @@ def screen(
     refit = list(range(1 + len(twin_residuals), 1 + len(twin_residuals) + n_free))
     alone = gram.left(0, refit)
     chance_alone = [gram.left(1 + k, refit) for k in range(len(twin_residuals))]
+    missing = max(alone - float(np.mean(chance_alone)), 0.0) if chance_alone else alone
     unpaid = track.unpaid(fit.model) if any(column.term.effect.slip is not None for column in columns) else 1.0
     able: list[tuple[Tried, list[int]]] = []
     promise: dict[int, float] = {}
@@ -337,6 +339,8 @@ def screen(
         able.append((Tried(column, left, alone - left, by_chance, solved[n_free:], solved[:n_free]), place))
         # A structure can't be there by a part: its values are judged by what it leaves as it is.
         promise[id(column)] = gram.left(whole, refit) * unpaid if whole else left
+        # In doubt it is the simpler law.
+        promise[id(column)] += further_parameters(column.term.effect) * PER_PARAMETER * missing
     best: dict[str, Tried] = {}
     laws: dict[str, Tried] = {}
     for tried, _ in sorted(able, key=lambda each: promise[id(each[0].column)]):

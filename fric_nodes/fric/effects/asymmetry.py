@@ -2,7 +2,8 @@
 
 Equation: F = D_C |sgn(v)| + D_v |v|: the Coulomb level is F_C + D_C forward and F_C - D_C backward, the viscous coefficient
 F_v + D_v forward and F_v - D_v backward. While the body slides, D_C acts exactly as a constant bias force does; the two differ
-only at rest, where a bias pushes and an asymmetric level does not.
+only at rest, where a bias pushes and an asymmetric level does not. Where the rise at low speed differs, too:
+``asymmetry/low_speed``.
 Source: de Marchi 1998 (asymmetric kinetic and viscous friction, mean and half difference of the two directions).
 """
 
@@ -27,6 +28,8 @@ def force(c: Context, force: float, coefficient: float) -> float:
 
 EFFECT = Effect(
     id="asymmetry",
+    law="linear",
+    usual=True,
     place=Place.SLIP_LEVEL,
     order=20,
     title="direction-dependent friction",

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...model import Term
 from ...record import Array
+from ..costs import NATS_PER_PARAMETER, further_parameters
 from ..fitting import State
 from ..screen import Column
 from .evidence import Grouped
@@ -56,10 +57,13 @@ def forms_of(state: State, taken: Additive) -> list[Form]:
     kept: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for name, law in laws.items():
         target = taken.grouped.residual(taken.weighed) + taken.grouped.part(law.place, taken.weighed)
-        kept.setdefault((law.place, law.column.term.effect.id), []).append((grouped.explained(name, target), name))
+        effect = law.column.term.effect
+        kept.setdefault((law.place, effect.key if effect.form_of else effect.id), []).append(
+            (grouped.explained(name, target), name)
+        )
     best: dict[str, dict[str, Form]] = {}
     noise = float(np.log(taken.weighed.noise / grouped.size))
-    for (place, effect), scored in kept.items():
+    for (place, _), scored in kept.items():
         without = taken.withouts[place]
         others = list(without.groups)
         start = dict(zip(others, without.sizes, strict=True))
@@ -68,10 +72,12 @@ def forms_of(state: State, taken: Additive) -> list[Form]:
             held = _possible(laws[name].column, -grouped.amounts(name, found) / laws[name].sizes)
             if held is None:
                 continue
-            form = Form(held, place, taken.dependence * (found.log_evidence - without.log_evidence))
-            before = best.setdefault(place, {}).get(effect)
-            if before is None or form.nats > before.nats:
-                best[place][effect] = form
+            nats = taken.dependence * (found.log_evidence - without.log_evidence)
+            # In doubt it is the simpler law: what a form was chosen for beyond its size, the evidence doesn't count.
+            nats -= NATS_PER_PARAMETER * further_parameters(held.effect)
+            before = best.setdefault(place, {}).get(held.effect.id)
+            if before is None or nats > before.nats:
+                best[place][held.effect.id] = Form(held, place, nats)
     return sorted(_shared(best), key=lambda each: -each.nats)
 
 
