@@ -79,10 +79,11 @@ def test_the_strength_is_the_root_mean_square_of_the_force_that_is_missing() -> 
     assert found.duration == pytest.approx(4.0, abs=0.01)
 
 
-def test_a_force_of_no_known_kind_is_unknown() -> None:
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_a_force_of_no_known_kind_is_unknown(seed: int) -> None:
     """Somebody pulls, at random times and either way."""
     made = since(BIASED)
-    rough = np.random.default_rng(3).standard_normal(20).repeat(100)
+    rough = np.random.default_rng(seed).standard_normal(20).repeat(100)
     pulled = replace(made, effort=made.effort + 3.0 * rough)
     found = suspects(BIASED, pulled, 140.0, FLOOR)
     assert found.effect == "unknown"

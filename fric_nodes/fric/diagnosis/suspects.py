@@ -175,19 +175,25 @@ def _ranked(track: Track, missing: Array, found: list[_Suspect], most: float) ->
 
 
 def _refined(track: Track, model: Model, ranked: list[_Suspect]) -> list[_Suspect]:
-    """The foremost suspects with values fitted instead of tried, where several come near each other; the best first."""
-    near = [each for each in ranked[:_REFINED] if each.left < _NEAR * ranked[0].left]
-    if len(near) < 2:
-        return ranked
+    """The foremost suspects with values fitted instead of tried, until the best is one of them; the best first.
+
+    What first order promises and no fit keeps explains nothing.
+    """
     missing = track.residual(model)
     energy = float(missing @ missing)
-    for k, each in enumerate(near):
+    fitted: list[_Suspect] = []
+    waiting = list(ranked)
+    while waiting and len(fitted) < _REFINED:
+        best = min((each.left for each in fitted), default=math.inf)
+        if waiting[0].left >= max(best, _NEAR * ranked[0].left):
+            break
+        each = waiting.pop(0)
         grown = model if each.term is None else model.with_terms((*model.terms, _sized(each, each.term, missing)))
         names = each.names or [name for name in free_names(grown) if name not in model.names]
         fit = track.fit(grown, names, _REFINING, bounds_of(grown, scales_of(track)))
         left = float(fit.residual @ fit.residual) + energy * (_PER_COLUMN * len(each.columns) + _PER_SHAPE * each.n_shapes)
-        near[k] = replace(each, left=min(left, each.left))
-    return sorted([*near, *(each for each in ranked if each not in ranked[: len(near)])], key=lambda each: each.left)
+        fitted.append(replace(each, left=left))
+    return sorted([*fitted, *waiting], key=lambda each: each.left)
 
 
 def _sized(suspect: _Suspect, held: Term, missing: Array) -> Term:
