@@ -23,7 +23,10 @@ from .plant import Plant
 from .plants import PLANTS
 from .record import Array, Units
 
-__all__ = ["Model", "ModelError", "NamedParameter", "Term", "build_model", "term"]
+__all__ = ["ENCODERS", "Model", "ModelError", "NamedParameter", "Term", "build_model", "term"]
+
+ENCODERS = ("motor", "load")
+"""Sides of a transmission on which a position may be measured; the first where nothing is said."""
 
 
 class ModelError(InputError):
@@ -64,6 +67,8 @@ class Model:
         nominal: the ``normal_load`` and the ``temperature`` [degC] at which the values hold, where known.
         standard_errors: standard error of identified parameters, by parameter name.
         provenance: where the values come from, free text by key.
+        encoder: the side of a transmission on which the position is measured: ``motor`` or ``load``. Without a transmission
+            both are one; it counts as soon as the model gets one.
     """
 
     plant: Plant
@@ -74,6 +79,7 @@ class Model:
     nominal: Mapping[str, float] = field(default_factory=dict)
     standard_errors: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
+    encoder: str = ENCODERS[0]
 
     def __post_init__(self) -> None:
         _check_structure(self)
@@ -147,9 +153,15 @@ class Model:
     def with_terms(self, terms: Iterable[Term]) -> Model:
         """The same plant with other terms; standard errors are dropped, since they belonged to the old structure."""
         ordered = _in_order(terms)
-        plant = _form(PLANTS[self.plant.id], ordered)
+        plant = _form(PLANTS[self.plant.id], ordered, self.encoder)
         values = _plant_values(plant, {p.name: v for p, v in zip(self.plant.parameters, self.plant_values, strict=True)})
         return replace(self, plant=plant, plant_values=values, terms=ordered, standard_errors={})
+
+    @property
+    def has_transmission(self) -> bool:
+        """True when it has two bodies because its terms hold a transmission."""
+        alone = PLANTS[self.plant.id]
+        return self.plant is alone.driven or self.plant is alone.behind
 
     @property
     def loops(self) -> Loops:
@@ -241,7 +253,7 @@ def build_model(plant: str, plant_values: Mapping[str, float], terms: Iterable[T
     if plant not in PLANTS:
         raise ModelError("model", f"unknown plant '{plant}'", f"use one of {', '.join(PLANTS)}")
     ordered = _in_order(terms)
-    kind = _form(PLANTS[plant], ordered)
+    kind = _form(PLANTS[plant], ordered, str(rest.get("encoder", ENCODERS[0])))
     known = {parameter.name for parameter in kind.parameters}
     for name in plant_values:
         if name not in known:
@@ -252,10 +264,11 @@ def build_model(plant: str, plant_values: Mapping[str, float], terms: Iterable[T
     return Model(kind, _plant_values(kind, plant_values), ordered, **rest)  # type: ignore[arg-type]
 
 
-def _form(plant: Plant, terms: Sequence[Term]) -> Plant:
-    """The plant itself, or its driven form where the terms hold a transmission and there is such a form."""
+def _form(plant: Plant, terms: Sequence[Term], encoder: str) -> Plant:
+    """The plant itself, or its driven form by the side of the encoder where the terms hold a transmission, if there is one."""
     transmitted = any(held.effect.link is not None or held.effect.play is not None for held in terms)
-    return plant.driven if transmitted and plant.driven is not None else plant
+    driven = plant.behind if encoder == "load" else plant.driven
+    return driven if transmitted and driven is not None else plant
 
 
 def _plant_values(plant: Plant, given: Mapping[str, float]) -> tuple[float, ...]:
@@ -279,6 +292,12 @@ def _check_structure(model: Model) -> None:
     laws = [held.effect for held in model.terms if held.effect.slip is not None]
     if len(laws) > 1:
         raise ModelError("model", f"two terms with slip dynamics ({laws[0].key}, {laws[1].key})", "keep one of them")
+    if model.encoder not in ENCODERS:
+        raise ModelError("model", f"encoder '{model.encoder}' is not known", f"use one of {', '.join(ENCODERS)}")
+    if model.encoder != ENCODERS[0] and PLANTS[model.plant.id].behind is None:
+        able = ", ".join(plant.id for plant in PLANTS.values() if plant.behind is not None)
+        problem = f"plant '{model.plant.id}' has no transmission with two sides to measure on"
+        raise ModelError("model", problem, f"leave the encoder out or use one of the plants {able or '(none)'}")
     if PLANTS[model.plant.id].driven is None:
         for held in model.terms:
             if held.effect.link is not None or held.effect.play is not None:

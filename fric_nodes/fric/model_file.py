@@ -16,7 +16,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from .effects import EFFECTS, by_name
 from .files import write_text
-from .model import Model, ModelError, Term, build_model
+from .model import ENCODERS, Model, ModelError, Term, build_model
 from .parameter import Parameter
 from .plants import PLANTS
 from .record import Units
@@ -25,6 +25,11 @@ from .text_form import STRICT, UnitsEntry, dumped, field_of, line_of, loaded, te
 __all__ = ["FORMAT", "json_schema", "model_from_text", "model_to_text", "read_model", "write_model"]
 
 FORMAT = "fric-model/1"
+
+
+_EncoderEntry = Annotated[
+    Literal[ENCODERS], Field(description="side of a transmission on which the position is measured")  # type: ignore[valid-type]
+]
 
 
 class _NominalEntry(BaseModel):
@@ -69,6 +74,8 @@ def _plant_entries() -> dict[str, type[BaseModel]]:
     for plant in PLANTS.values():
         fields: dict[str, Any] = {"type": (Literal[plant.id], ...)}
         fields |= {parameter.name: field_of(parameter) for parameter in (plant.driven or plant).parameters}
+        if plant.behind is not None:
+            fields["encoder"] = (_EncoderEntry, ENCODERS[0])
         doc = f"{plant.title}: {plant.equation} ({plant.source})"
         entries[plant.id] = create_model(f"plant_{plant.id}", __config__=STRICT, __doc__=doc, **fields)
     return entries
@@ -118,7 +125,7 @@ def model_from_text(text: str, source: str = "model") -> Model:
         entry = _validated(entry_type, raw, tree, at, source)
         assert effect is not None
         terms.append(Term(effect, tuple(float(getattr(entry, p.name)) for p in effect.parameters)))
-    plant_values = {name: float(getattr(plant_entry, name)) for name in plant_entry.model_fields_set - {"type"}}
+    plant_values = {name: float(getattr(plant_entry, name)) for name in plant_entry.model_fields_set - {"type", "encoder"}}
     try:
         model = build_model(
             header.plant["type"],
@@ -129,6 +136,7 @@ def model_from_text(text: str, source: str = "model") -> Model:
             nominal=header.nominal.model_dump(exclude_none=True),
             standard_errors=header.standard_errors,
             provenance=header.provenance,
+            encoder=getattr(plant_entry, "encoder", ENCODERS[0]),
         )
     except ModelError as error:
         raise ModelError(f"{source}, line {line_of(tree, ('terms',))}", error.problem, error.remedy) from None
@@ -179,7 +187,8 @@ def model_to_text(model: Model) -> str:
     root["format"] = FORMAT
     root["joint"] = model.joint
     root["units"] = units_entry(model.units)
-    root["plant"] = entry({"type": model.plant.id}, model.plant.parameters, model.plant_values)
+    plant = {"type": model.plant.id} | ({"encoder": model.encoder} if model.encoder != ENCODERS[0] else {})
+    root["plant"] = entry(plant, model.plant.parameters, model.plant_values)
     terms = CommentedSeq()
     for held in model.terms:
         first = {"effect": held.effect.id} | ({"law": held.effect.law} if held.effect.law else {})

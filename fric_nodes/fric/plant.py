@@ -63,13 +63,15 @@ class Plant:
         inertia: mass that the contact feels [F s^2/x] from the plant's own values, for step sizes.
         encoder: which states the sensor reports as position and velocity.
         whole: mass that a slow command moves [F s^2/x], from the plant's own values; None: as ``inertia``.
-        seen: mass of the body that the sensor sees, by itself [F s^2/x], from the plant's own values; None: as ``whole``.
+        actuated: which states are position and velocity of the body that the command moves; None: as ``encoder``.
+        motor: mass of that body, by itself [F s^2/x], from the plant's own values; None: as ``whole``.
         initial: the states at rest from ``(values, position, velocity)``; None: zeros, but for position and velocity.
         signals: what it measures besides.
         effort: the force on the contact, as :attr:`Signal.of`, where the command isn't a force; None: the applied command.
         command: what the command is.
         rate: fastest rate of the plant itself [1/s] from its own values; None: slow.
         driven: the plant whose functions take over when the model has a transmission; None: it can't have one.
+        behind: the same with the sensor on the load; None: the sensor can't be there.
         led: the effort is measured at the contact: what moves the bodies is not in it, nor is their mass to be found.
     """
 
@@ -88,17 +90,19 @@ class Plant:
     command: Parameter = _FORCE
     rate: Callable[..., float] | None = None
     driven: Plant | None = None
+    behind: Plant | None = None
     whole: Callable[..., float] | None = None
-    seen: Callable[..., float] | None = None
+    actuated: tuple[int, int] | None = None
+    motor: Callable[..., float] | None = None
     led: bool = False
 
     def total_inertia(self, *values: float) -> float:
         """Mass that a slow command moves [F s^2/x]."""
         return (self.inertia if self.whole is None else self.whole)(*values)
 
-    def seen_inertia(self, *values: float) -> float:
-        """Mass of the body that the sensor sees, by itself [F s^2/x]."""
-        return self.total_inertia(*values) if self.seen is None else self.seen(*values)
+    def motor_inertia(self, *values: float) -> float:
+        """Mass of the body that the command moves, by itself [F s^2/x]."""
+        return self.total_inertia(*values) if self.motor is None else self.motor(*values)
 
     @property
     def inertia_names(self) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ def test_an_effect_is_the_same_one(key: str) -> None:
 
 @pytest.mark.parametrize("plant", PLANTS)
 def test_a_plant_is_the_same_one_with_and_without_a_transmission(plant: str) -> None:
-    for each in (PLANTS[plant], PLANTS[plant].driven):
+    for each in (PLANTS[plant], PLANTS[plant].driven, PLANTS[plant].behind):
         assert pickle.loads(pickle.dumps(each)) is each
 
 

@@ -194,7 +194,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
 
 def test_the_schema_lists_every_effect_with_its_bounds() -> None:
     definitions = json_schema()["$defs"]
-    for name in ("coulomb", "viscous", "bias", "asymmetry", "stribeck_exponential", "presliding_lugre"):
+    for name in ("coulomb", "viscous", "bias", "asymmetry_linear", "stribeck_exponential", "presliding_lugre"):
         entry = definitions[f"term_{name}"]
         assert entry["additionalProperties"] is False
         assert "=" in entry["description"]

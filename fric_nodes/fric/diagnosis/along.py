@@ -13,7 +13,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..model import Model, Term
-from ..plants import PLANTS
 from ..record import Array
 from .least_squares import Bounds, fitted_values
 from .track import Track
@@ -58,7 +57,7 @@ class Along:
 
     def can(self, model: Model) -> bool:
         """True for models whose force the motion at the sensor tells."""
-        at_sensor = PLANTS[model.plant.id].driven is not model.plant and not model.plant.led
+        at_sensor = not model.has_transmission and not model.plant.led
         return at_sensor and bool(np.any(self.moving))
 
     def residual(self, model: Model, extra: Term | None = None) -> Array:

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..effect import Effect, Place
-from ..model import Model, Term
+from ..model import ENCODERS, Model, Term
 from ..parameter import Parameter
 from ..plants import PLANTS
 from ..record import Array
@@ -138,11 +138,25 @@ def candidates(model: Model, scales: Scales) -> list[Candidate]:
         if effect.level is not None and effect.remember is not None and not has_level:
             continue  # what friction gains at rest, or follows late, is relative to a level
         trials = tuple(Term(effect, values) for values in _values(effect, scales))
+        if effect.play is not None and model.encoder != ENCODERS[0]:
+            trials = tuple(_closer(trials))
         if play and effect.link is not None:
             trials = tuple(_stops(trials[0], scales))
         if trials:
             found.append(Candidate(effect, trials))
     return found
+
+
+def _closer(trials: Sequence[Term]) -> Iterator[Term]:
+    """``trials``, and one in the geometric middle of each two.
+
+    Where the load is measured, the motor crosses a play unseen. When it arrives is all that tells the play: what is a little
+    too wide, or too narrow, lacks as much as none.
+    """
+    yield trials[0]
+    for before, after in itertools.pairwise(trials):
+        yield Term(after.effect, tuple(math.sqrt(one * other) for one, other in zip(before.values, after.values, strict=True)))
+        yield after
 
 
 def _stops(held: Term, scales: Scales) -> Iterator[Term]:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Model, Term
-from ..plants import PLANTS
 from ..record import Array
 from ..threads import mapped
 from .along import Along
@@ -85,7 +84,7 @@ class State:
 
 def is_driven(model: Model) -> bool:
     """True when the model has two bodies because it has a transmission."""
-    return model.plant is PLANTS[model.plant.id].driven
+    return model.has_transmission
 
 
 def free_names(model: Model) -> tuple[str, ...]:

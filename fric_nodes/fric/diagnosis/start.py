@@ -144,7 +144,7 @@ def refuse_other_plant(train: Sequence[Record], track: Track, start: Model) -> N
     No effect is what is missing in it.
     """
     rigid = PLANTS["rigid"]
-    if start.plant.led or start.plant in (rigid, rigid.driven):
+    if start.plant.led or start.plant in (rigid, rigid.driven, rigid.behind):
         return
     spread = spread_of(track)
     plain = build_model("rigid", {"mass": start.total_inertia}, start.terms, units=start.units, nominal=start.nominal)

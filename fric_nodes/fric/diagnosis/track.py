@@ -35,7 +35,6 @@ from scipy.signal import lfilter
 
 from ..identification.innovations import Run
 from ..model import Model, Term
-from ..plants import PLANTS
 from ..record import Array
 from ..simulation import respond, substeps
 from ..threads import n_threads
@@ -82,7 +81,7 @@ class Track(Runs):
 
     def _first(self, model: Model, k: int) -> int:
         """Interval of run ``k`` at which ``model`` has to begin, to be where the axis is when it counts."""
-        if _remembers(model) or model.plant is PLANTS[model.plant.id].driven:
+        if _remembers(model) or model.has_transmission:
             return 0
         return max(self.lead[k] - self.settled(k), 0)
 

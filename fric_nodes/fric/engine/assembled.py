@@ -12,6 +12,8 @@ from ..effect import Context
 
 __all__ = [
     "ACCELERATION",
+    "ACTUATED",
+    "ACTUATED_RATE",
     "ELASTIC",
     "MEMORY",
     "N_STATES",
@@ -62,6 +64,12 @@ SEEN = 0
 
 SEEN_RATE = 1
 """Index of the state that the sensor reports as velocity."""
+
+ACTUATED = 0
+"""Index of the state that is the position of the body that the command moves."""
+
+ACTUATED_RATE = 1
+"""Index of the state that is its velocity."""
 
 
 class Inner(NamedTuple):

@@ -213,6 +213,7 @@ def _source(plant: Plant, effects: tuple[Effect, ...]) -> str:
         f"MEMORY = {any(effect.remember is not None for effect in effects)}",
         f"N_STATES = {len(plant.states)}",
         f"SEEN, SEEN_RATE = {plant.encoder}",
+        f"ACTUATED, ACTUATED_RATE = {plant.actuated or plant.encoder}",
         f"@kernel\ndef unpacked(p):\n    return ({''.join(f'p[{k}], ' for k in range(n_parameters))})",
         "@kernel\ndef bends(p):",
         f"    return {bool(parts.bending)}",

@@ -223,6 +223,7 @@ def _source(plant: Plant, rigid: bool, elastic: bool) -> str:
         f"ELASTIC = {elastic}",
         f"N_STATES = {len(plant.states)}",
         f"SEEN, SEEN_RATE = {plant.encoder}",
+        f"ACTUATED, ACTUATED_RATE = {plant.actuated or plant.encoder}",
         "@kernel\ndef unpacked(p):",
         "    at, table = address_of(p.values), address_of(p.table)",
         # A play doesn't change while a loop runs.

@@ -10,6 +10,8 @@ from typing import Any
 
 from ..effect import Context
 from .assembled import (
+    ACTUATED,
+    ACTUATED_RATE,
     MEMORY,
     N_STATES,
     PUSHED,
@@ -142,8 +144,9 @@ def observe(
     ``innovation[k]`` is ``y[k]`` minus its prediction [x], for ``len(u)`` intervals of lengths ``h`` [s]. The correction has
     the constant gains of an alpha-beta filter. A contact that sticks exactly is left at rest while the innovation stays within
     three times ``noise`` [x]: the noise of an encoder must not shake it loose. Where the sensor sees a motor, the load is
-    carried along, unless it sticks: what was learnt about both together must not push the one into the other. A run that is
-    part of a recording gives, after its ``states``, the time at which it begins [s].
+    carried along, unless it sticks: what was learnt about both together must not push the one into the other. Where it sees the
+    load, the motor is carried along. A run that is part of a recording gives, after its ``states``, the time at which it begins
+    [s].
     """
     prepare(p, constants)
     p = unpacked(p)
@@ -166,8 +169,12 @@ def observe(
             if x[1] != 0.0:
                 x[1] += beta * e / h[k]
         x[SEEN] += alpha * e
+        if ACTUATED != SEEN:
+            x[ACTUATED] += alpha * e
         if not (RIGID and x[SEEN_RATE] == 0.0 and abs(e) <= 3.0 * noise):
             x[SEEN_RATE] += beta * e / h[k]
+            if ACTUATED != SEEN:
+                x[ACTUATED_RATE] += beta * e / h[k]
         t += h[k]
     for j in range(N_STATES):
         states[j] = x[j]
@@ -186,9 +193,9 @@ def pursue(
     by a force, whatever the model's own friction is. A contact that sticks exactly is the exception: where the body rests and
     is seen to rest it is put where it is seen, and left at rest while it is within three times ``noise`` [x] of it. Bristles
     are the other: an impulse would ring on them, and with a ``gain`` of one they get the alpha-beta filter itself. Where the
-    sensor sees a motor, the load is carried along, unless it sticks. ``extra`` is a force that acts behind the command path
-    besides, one value or ``(n,)`` [F]. A run that is part of a recording gives, after its ``states``, the time at which it
-    begins [s].
+    sensor sees a motor, the load is carried along, unless it sticks; where it sees the load, the motor is. ``extra`` is a force
+    that acts behind the command path besides, one value or ``(n,)`` [F]. A run that is part of a recording gives, after its
+    ``states``, the time at which it begins [s].
     """
     prepare(p, constants)
     p = unpacked(p)
@@ -214,6 +221,8 @@ def pursue(
             x[SEEN] += alpha * e
             if SEEN != 0:
                 x[0] += alpha * e
+            if ACTUATED != SEEN:
+                x[ACTUATED] += alpha * e
         elif x[SEEN_RATE] == 0.0 and (k == 0 or abs(y[k] - y[k - 1]) <= 3.0 * noise):
             for j in range(0, N_STATES, 2):
                 x[j] += alpha * e
@@ -222,6 +231,8 @@ def pursue(
         if SEEN != 0 and x[1] != 0.0:
             x[1] += gain * push / h[k]
         x[SEEN_RATE] += gain * push / h[k]
+        if ACTUATED != SEEN:
+            x[ACTUATED_RATE] += gain * push / h[k]
         t += h[k]
     for j in range(N_STATES):
         states[j] = x[j]
@@ -233,9 +244,10 @@ def lead(
 ) -> None:  # fmt: skip
     """Lead the model along a motion: a stiff spring and damper add to what ``u`` does what it takes to be at ``q`` with ``v``.
 
-    ``q[k]`` and ``v[k]`` are wanted at the beginning of interval k, of length ``h[k]`` [s]; ``y_out[k]`` is the sensor's
-    position at its end and ``extra_out[k]`` the force that spring and damper give over it, behind the command path, whose
-    delay would make them swing. Together with ``u`` they are a recording of this model on that motion.
+    They act on the body that the command moves, and what is behind a transmission follows. ``q[k]`` and ``v[k]`` are wanted at
+    the beginning of interval k, of length ``h[k]`` [s]; ``y_out[k]`` is the sensor's position at its end and ``extra_out[k]``
+    the force that spring and damper give over it, behind the command path, whose delay would make them swing. Together with
+    ``u`` they are a recording of this model on that motion.
     """
     prepare(p, constants)
     p = unpacked(p)
@@ -248,7 +260,7 @@ def lead(
         h_sub = h[k] / n_sub
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
-        extra = stiffness * (q[k] - x[SEEN]) + damping * (v[k] - x[SEEN_RATE])
+        extra = stiffness * (q[k] - x[ACTUATED]) + damping * (v[k] - x[ACTUATED_RATE])
         for m in range(n_sub):
             around = Surroundings(t + m * h_sub, load_k, temperature_k)
             advance(p, x, x_next, s, command(u[k], h_sub, memory, p) + extra, h_sub, around)

@@ -14,15 +14,19 @@ PLANTS: dict[str, Plant] = {plant.id: plant for plant in discover(__name__, "PLA
 """Every kind of plant by its id."""
 
 
-def _known(plant: str, driven: bool) -> Plant | None:
-    return PLANTS[plant].driven if driven else PLANTS[plant]
+def _forms(plant: Plant) -> tuple[Plant | None, ...]:
+    return plant, plant.driven, plant.behind
+
+
+def _known(plant: str, form: int) -> Plant | None:
+    return _forms(PLANTS[plant])[form]
 
 
 def _pickled(plant: Plant) -> tuple[Any, ...]:
     """A plant of the catalogue goes to another process by its name: there is one of each, and its functions are not copied."""
-    for driven in (False, True):
-        if plant.id in PLANTS and _known(plant.id, driven) is plant:
-            return _known, (plant.id, driven)
+    for form, each in enumerate(_forms(PLANTS[plant.id]) if plant.id in PLANTS else ()):
+        if each is plant:
+            return _known, (plant.id, form)
     return object.__reduce_ex__(plant, 2)  # type: ignore[return-value]
 
 

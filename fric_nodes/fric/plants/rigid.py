@@ -14,7 +14,7 @@ from ..engine.contact import CONTACT_FUNCTIONS, contact_step
 from ..engine.kernel import kernel
 from ..parameter import Parameter
 from ..plant import Plant
-from .rigid_driven import DRIVEN
+from .rigid_driven import BEHIND, DRIVEN
 
 __all__ = ["PLANT"]
 
@@ -50,4 +50,5 @@ PLANT = Plant(
     functions=(own, *CONTACT_FUNCTIONS, step, drive),
     inertia=_inertia,
     driven=DRIVEN,
+    behind=BEHIND,
 )

@@ -1,14 +1,16 @@
-"""Rigid axis behind a transmission: its mass in two parts, of which the sensor sees the motor's.
+"""Rigid axis behind a transmission: its mass in two parts, of which the sensor sees the motor's, or the load's.
 
 Equation: m_m d^2y/dt^2 = u - L, m_l d^2q/dt^2 = L - F(q, v, t) - F_contact, with m_l = s m, m_m = (1 - s) m, and L the force of
 the model's transmission terms over y - q; stepped by :mod:`fric.engine.transmission`. It takes the rigid axis's place as
 soon as a model of it gets backlash or compliance, so that a model can grow by them; the share s of the mass that lies behind
-the transmission is held at its value unless a fit is asked to free it.
+the transmission is held at its value unless a fit is asked to free it. The command acts on the motor. An encoder on its shaft
+gives y; a scale on the guideway, or an encoder behind a gear, gives q (``encoder: load`` in a model file).
 Source: Newton; the two-mass model of a drive.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,7 @@ from ..parameter import Parameter
 from ..plant import Plant, Signal
 from ..record import Array
 
-__all__ = ["DRIVEN"]
+__all__ = ["BEHIND", "DRIVEN"]
 
 
 @kernel
@@ -42,7 +44,7 @@ def _whole(mass: float, load_share: float) -> float:
     return mass
 
 
-def _seen(mass: float, load_share: float) -> float:
+def _motor(mass: float, load_share: float) -> float:
     return mass * (1.0 - load_share)
 
 
@@ -53,6 +55,10 @@ def _initial(values: Array, position: float, velocity: float) -> Array:
 
 def _load_position(values: Array, states: Array, command: Array) -> Array:
     return states[:, 0]
+
+
+def _motor_position(values: Array, states: Array, command: Array) -> Array:
+    return states[:, 2]
 
 
 DRIVEN = Plant(
@@ -71,7 +77,15 @@ DRIVEN = Plant(
     inertia=_inertia,
     encoder=(2, 3),
     whole=_whole,
-    seen=_seen,
+    actuated=(2, 3),
+    motor=_motor,
     initial=_initial,
     signals=(Signal("load_position", "x", "position of the load, behind the transmission", _load_position),),
+)
+
+BEHIND = replace(
+    DRIVEN,
+    title="rigid axis behind a transmission, measured on the load",
+    encoder=(0, 1),
+    signals=(Signal("motor_position", "x", "position of the motor, before the transmission", _motor_position),),
 )

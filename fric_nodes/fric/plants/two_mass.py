@@ -6,7 +6,8 @@ Equations, with q the load's position and y the motor's:
 
 L is the force of the model's transmission terms (``backlash``, ``impact_backlash``, ``compliance``) over y - q; without any,
 both are rigidly coupled. The friction of the terms is the load's, F_m and c_m are the motor's own. The command acts on the
-motor, and the sensor sees the motor; the load's position is measured besides. Stepped by :mod:`fric.engine.transmission`.
+motor, and the sensor sees the motor, or the load (``encoder: load`` in a model file); the other position is measured besides.
+Stepped by :mod:`fric.engine.transmission`.
 A fit from force and motion sees the sum of the masses only, so it holds the load's unless it is asked to free it.
 Source: de Marchi 1998, mechanical positioning test bed (Walczyk and Craig 1991) with adjustable friction, backlash and
 compliance; the equations are those of the usual two-mass model.
@@ -49,7 +50,7 @@ def _whole(motor_mass: float, load_mass: float, motor_coulomb: float, motor_visc
     return motor_mass + load_mass
 
 
-def _seen(motor_mass: float, load_mass: float, motor_coulomb: float, motor_viscous: float) -> float:
+def _motor(motor_mass: float, load_mass: float, motor_coulomb: float, motor_viscous: float) -> float:
     return motor_mass
 
 
@@ -60,6 +61,10 @@ def _initial(values: Array, position: float, velocity: float) -> Array:
 
 def _load_position(values: Array, states: Array, command: Array) -> Array:
     return states[:, 0]
+
+
+def _motor_position(values: Array, states: Array, command: Array) -> Array:
+    return states[:, 2]
 
 
 def _deflection(values: Array, states: Array, command: Array) -> Array:
@@ -85,7 +90,8 @@ _TEST_BED = Plant(
     inertia=_inertia,
     encoder=(2, 3),
     whole=_whole,
-    seen=_seen,
+    actuated=(2, 3),
+    motor=_motor,
     initial=_initial,
     signals=(
         Signal("load_position", "x", "position of the load, behind the transmission", _load_position),
@@ -93,4 +99,13 @@ _TEST_BED = Plant(
     ),
 )
 
-PLANT = replace(_TEST_BED, driven=_TEST_BED)
+_BEHIND = replace(
+    _TEST_BED,
+    encoder=(0, 1),
+    signals=(
+        Signal("motor_position", "x", "position of the motor, before the transmission", _motor_position),
+        _TEST_BED.signals[1],
+    ),
+)
+
+PLANT = replace(_TEST_BED, driven=_TEST_BED, behind=_BEHIND)
