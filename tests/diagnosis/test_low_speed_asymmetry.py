@@ -124,9 +124,8 @@ def test_in_the_place_of_plain_asymmetry_it_begins_at_the_values_that_promise_mo
     model = NOMINAL.with_terms((*NOMINAL.terms, term("asymmetry", coefficient=1.0)))
     fit = refit(track, model).fit
     place = model.prefixes.index("asymmetry")
-    begun, sharper = laws_in_place(track, fit, place)
-    assert begun.effect is sharper.effect is LOW_SPEED
-    assert (begun.by_name["exponent"], sharper.by_name["exponent"]) == (2.0, 1.0)
+    (begun,) = laws_in_place(track, fit, place)
+    assert begun.effect is LOW_SPEED
     assert 0.01 < begun.by_name["velocity"] < 0.1
     assert begun.by_name["low_speed"] == pytest.approx(1.5, rel=0.5)
     assert begun.by_name["coefficient"] == fit.model.value("asymmetry.coefficient")

@@ -13,7 +13,7 @@ from ..effect import Effect
 from ..model import Term
 from .candidates import Scales
 from .fitting import State, bounds_of, free_names
-from .other_laws import laws_further, laws_in_place, told
+from .other_laws import laws_beside, laws_further, told
 from .price import OF_FLOOR, price_of
 from .rival import Rival, rival_of
 from .screen import Screening
@@ -37,7 +37,7 @@ def shaped(track: Track, state: State, rival: Rival, found: Screening, scales: S
         if not own or rival.left < (1.0 + OF_FLOOR) * state.floor:
             continue
         held = best.fit.model.terms[own[-1]]
-        for term in laws_in_place(track, best.fit, own[-1]):
+        for term in laws_beside(held, scales):
             if term.effect.slip is not None and term.effect is not held.effect:
                 continue  # is tried when the effect has come
             model = best.fit.model.with_terms(term if k == own[-1] else one for k, one in enumerate(best.fit.model.terms))

@@ -70,7 +70,7 @@ def laws_in_place(track: Track, fit: Fit, place: int) -> list[Term]:
     for law in EFFECTS.values():
         if law.id == held.effect.id and law.form_of == held.effect.law and law.form_of:
             term = _begun(track, fit, place, list(_suggested(law, held, scales)))
-            found += [] if term is None else [term, *_shaped(term)]
+            found += [] if term is None else [term]
     return found
 
 
