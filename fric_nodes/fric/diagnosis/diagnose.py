@@ -162,7 +162,8 @@ def _grown_by_all(tracks: Sequence[Track], start: Model, tell: Callable[[str], N
 def refit_noe(model: Model, train: Sequence[Record], validation: Sequence[Record], bandwidth: float) -> float:
     """NOE of ``model``, fitted to ``train``, on ``validation`` [%], as an observer of ``bandwidth`` [rad/s] sees it."""
     conditions = nominal_conditions(train) | dict(model.nominal)
-    train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
+    train, validation, _ = without_faults(train, validation, model, inspect(train, model))
+    train, validation = ([evened(replace(record, nominal=conditions)) for record in held] for held in (train, validation))
     track, state = best_track(tracks_of(train, model, lateness(train, model)), model)
     held = replace(Track.of(validation, bandwidth, model, track.late), mass=track.mass)
     left = held.residual(state.fit.model)
