@@ -125,7 +125,9 @@ def test_other_laws_take_over_what_means_the_same() -> None:
     # A shape is tried with all values that machines have.
     assert [each.by_name["exponent"] for each in laws if each.effect.law == "gms"] == [2.0, 4.0]
     stribeck = term("stribeck", "exponential", force=2.0, velocity=0.1, exponent=1.0)
-    assert [each.by_name.get("exponent") for each in laws_beside(stribeck, scales)] == [2.0, None, None]
+    offered = [(each.effect.law, each.by_name.get("exponent")) for each in laws_beside(stribeck, scales)]
+    forms = [("exponential", 2.0), ("directional", 2.0), ("directional", 1.0)]
+    assert offered == [*forms, ("hess_soom", None), ("static", None)]
     # Laws that are candidates of their own aren't tried again, and a form of one law takes no other's place.
     assert not list(laws_beside(term("position_dependence", "periodic", cosine=1.0, sine=0.0, period=1.0), scales))
     (peak,) = laws_beside(term("position_dependence", "local", amplitude=0.5, position=0.1, width=0.02), scales)

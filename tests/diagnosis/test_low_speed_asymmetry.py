@@ -92,6 +92,20 @@ def test_a_rise_that_differs_is_found_beside_a_stribeck_effect(truth: Lopsided) 
     assert abs(finding.parameters["asymmetry.coefficient"].value) < 0.3
 
 
+def test_beside_it_plain_asymmetry_is_told_as_that() -> None:
+    truth = Lopsided(coulomb=(6.5, 5.5), viscous=(23.0, 17.0))
+    result = found(truth, nominal())
+    assert {(each.effect, each.law) for each in result.findings} == {("stribeck", "directional"), ("asymmetry", "linear")}
+    values = {name: each.value for finding in result.findings for name, each in finding.parameters.items()}
+    assert values["stribeck.difference"] == pytest.approx(1.0, rel=0.05)
+    assert values["asymmetry.coefficient"] == pytest.approx(3.0, rel=0.05)
+
+
+def test_a_stribeck_effect_that_is_the_same_both_ways_is_told_as_that() -> None:
+    (finding,) = found(Lopsided(surplus=(2.0, 2.0)), nominal()).findings
+    assert (finding.effect, finding.law) == ("stribeck", "exponential")
+
+
 def test_what_differs_at_every_speed_is_plain_asymmetry() -> None:
     truth = Lopsided(coulomb=(6.5, 5.5), surplus=(2.0, 2.0), viscous=(23.0, 17.0))
     (finding,) = found(truth, nominal(term("stribeck", force=1.0, velocity=0.02))).findings
@@ -99,14 +113,14 @@ def test_what_differs_at_every_speed_is_plain_asymmetry() -> None:
     assert finding.parameters["asymmetry.coefficient"].value == pytest.approx(3.0, rel=0.05)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("surplus", [(3.0, 1.0), (3.0, 0.0), (3.0, 2.0)])
-def test_it_is_found_together_with_the_stribeck_effect(surplus: tuple[float, float]) -> None:
+@pytest.mark.parametrize("surplus", [(3.0, 1.0), (0.0, 3.0), (3.0, 2.0)])
+def test_it_is_found_with_the_stribeck_effect_itself(surplus: tuple[float, float]) -> None:
     result = found(Lopsided(surplus=surplus), nominal())
-    assert {(each.effect, each.law) for each in result.findings} == {("stribeck", "exponential"), ("asymmetry", "low_speed")}
-    values = {name: each.value for finding in result.findings for name, each in finding.parameters.items()}
+    assert [(each.effect, each.law) for each in result.findings] == [("stribeck", "directional")]
+    values = {name: each.value for name, each in result.findings[0].parameters.items()}
     assert values["stribeck.force"] == pytest.approx(0.5 * sum(surplus), rel=0.05)
-    assert values["asymmetry.low_speed"] == pytest.approx(0.5 * (surplus[0] - surplus[1]), rel=0.05)
+    assert values["stribeck.difference"] == pytest.approx(0.5 * (surplus[0] - surplus[1]), rel=0.05)
+    assert values["stribeck.velocity"] == pytest.approx(0.01, rel=0.05)
 
 
 def test_a_form_that_may_show_alone_is_tried_and_costs_what_it_has_beyond_its_law() -> None:
@@ -115,7 +129,8 @@ def test_a_form_that_may_show_alone_is_tried_and_costs_what_it_has_beyond_its_la
     assert further_parameters(LOW_SPEED) == 2
     assert further_parameters(EFFECTS["asymmetry/linear"]) == 0
     # Other forms are tried in the place of their law only.
-    assert [each.key for each in worth_trying() if each.form_of] == ["asymmetry/low_speed"]
+    assert [each.key for each in worth_trying() if each.form_of] == ["asymmetry/low_speed", "stribeck/directional"]
+    assert further_parameters(EFFECTS["stribeck/directional"]) == 1
 
 
 def test_in_the_place_of_plain_asymmetry_it_begins_at_the_values_that_promise_most() -> None:

@@ -112,7 +112,10 @@ def test_a_play_behind_the_motor_is_found_where_the_load_is_measured() -> None:
 @pytest.mark.long
 def test_a_shaft_before_the_load_is_found_where_the_load_is_measured() -> None:
     result = found(SHAFT, nominal())
-    assert [each.effect for each in result.findings] == ["compliance"]
+    assert result.findings[0].effect == "compliance"
+    assert result.findings[0].confidence > 0.5
+    # Bristles that give by less than the sensor tells may be told beside it, as unlikely.
+    assert all(each.confidence < 0.5 for each in result.findings[1:])
     values = {name: each.value for name, each in result.findings[0].parameters.items()}
     assert values["compliance.stiffness"] == pytest.approx(1263.0, rel=0.02)
     assert result.model.value("load_share") == pytest.approx(0.5, rel=0.05)

@@ -25,25 +25,32 @@ def curve(v: float, way: float) -> float:
     return way * (coulomb + (static - coulomb) * math.exp(-((v / V_S) ** 2))) + viscous * v
 
 
-def axis() -> Model:
-    """Mean and half difference of both directions as terms."""
+def axis(law: str = "low_speed") -> Model:
+    """Mean and half difference of both directions as terms, that at low speed by ``asymmetry`` or by ``stribeck``."""
     mean, half = (0.5 * (np.array(FORWARD) + sign * np.array(BACKWARD)) for sign in (1.0, -1.0))
-    return build_model(
-        "rigid",
-        {"mass": 2.0},
-        [
-            term("coulomb", force=mean[0]),
-            term("stribeck", force=mean[1] - mean[0], velocity=V_S),
-            term("viscous", coefficient=mean[2]),
-            term("asymmetry", "low_speed", force=half[0], coefficient=half[2], low_speed=half[1] - half[0], velocity=V_S),
+    surplus, difference = mean[1] - mean[0], half[1] - half[0]
+    low_speed = {
+        "low_speed": [
+            term("stribeck", force=surplus, velocity=V_S),
+            term("asymmetry", "low_speed", force=half[0], coefficient=half[2], low_speed=difference, velocity=V_S),
         ],
-    )
+        "directional": [
+            term("stribeck", "directional", force=surplus, difference=difference, velocity=V_S),
+            term("asymmetry", force=half[0], coefficient=half[2]),
+        ],
+    }
+    always = [term("coulomb", force=mean[0]), term("viscous", coefficient=mean[2])]
+    return build_model("rigid", {"mass": 2.0}, [*always, *low_speed[law]])
 
 
-def test_each_direction_has_its_own_curve() -> None:
+LAWS = pytest.mark.parametrize("law", ["low_speed", "directional"])
+
+
+@LAWS
+def test_each_direction_has_its_own_curve(law: str) -> None:
     v = np.array([-0.5, -0.02, -0.005, -1e-6, 1e-6, 0.003, 0.02, 0.7])
     zero = np.zeros_like(v)
-    assert predict_force(axis(), zero, zero, v, zero, 1e-3) == pytest.approx(
+    assert predict_force(axis(law), zero, zero, v, zero, 1e-3) == pytest.approx(
         [curve(each, math.copysign(1.0, each)) for each in v], rel=1e-12
     )
 
@@ -60,16 +67,18 @@ def test_the_half_difference_falls_as_it_says(exponent: float) -> None:
     assert level(10.0) == pytest.approx(0.5)
 
 
-def test_it_breaks_away_at_the_static_level_of_each_direction() -> None:
+@LAWS
+def test_it_breaks_away_at_the_static_level_of_each_direction(law: str) -> None:
     for static, sign in ((FORWARD[1], 1.0), (BACKWARD[1], -1.0)):
-        held, _ = Simulator(axis()).run(np.full(100, sign * (static - 1e-9)), 1e-3)
+        held, _ = Simulator(axis(law)).run(np.full(100, sign * (static - 1e-9)), 1e-3)
         assert np.all(held == 0.0)
-        moved, _ = Simulator(axis()).run(np.full(100, sign * (static + 1e-3)), 1e-3)
+        moved, _ = Simulator(axis(law)).run(np.full(100, sign * (static + 1e-3)), 1e-3)
         assert moved[-1, 0] * sign > 0.0
 
 
+@LAWS
 @pytest.mark.parametrize(("start", "push"), [(0.08, 2.0), (-0.08, -2.0), (0.05, -3.0)])
-def test_it_comes_to_rest_where_and_when_the_equation_says(start: float, push: float) -> None:
+def test_it_comes_to_rest_where_and_when_the_equation_says(law: str, start: float, push: float) -> None:
     def rate(_: float, y: Array) -> list[float]:
         return [y[1], (push - curve(y[1], math.copysign(1.0, start))) / 2.0]
 
@@ -80,7 +89,7 @@ def test_it_comes_to_rest_where_and_when_the_equation_says(start: float, push: f
     exact = solve_ivp(rate, (0.0, 2.0), [0.0, start], "DOP853", events=rests, rtol=1e-11, atol=1e-14)
     (when,), ((where, _),) = exact.t_events[0], exact.y_events[0]
     h = 1e-4
-    states, _ = Simulator(axis(), velocity=start).run(np.full(math.ceil(when / h) + 50, push), h)
+    states, _ = Simulator(axis(law), velocity=start).run(np.full(math.ceil(when / h) + 50, push), h)
     assert h * (1 + int(np.argmax(states[:, 1] == 0.0))) == pytest.approx(when, abs=2.0 * h)
     assert states[-1, 1] == 0.0
     assert states[-1, 0] == pytest.approx(where, abs=1e-7)

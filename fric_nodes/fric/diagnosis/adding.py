@@ -20,7 +20,7 @@ from .reproduced import reproduced
 from .rival import Rival
 from .rivals import rivals_of
 from .screen import Tried, screen
-from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, exchanged, merged, settled
+from .settle import CLEARLY, FLOOR_KNOWN, NEARLY_ALL, Settled, Step, by_simpler_laws, exchanged, merged, settled
 from .track import Track
 
 __all__ = ["extended_by_terms", "grown_on", "settled_again"]
@@ -75,7 +75,7 @@ def extended_by_terms(
         steps += _steps_by(best, state, tuple(rivals[1:]), last)
         # What is left may show best to another observer.
         track, state = best_track(tracks, best.fit.model, 6, floors, track)
-        state, steps = merged(track, begin, state, steps)
+        state, steps = by_simpler_laws(track, begin, *merged(track, begin, state, steps))
         missing = refit(track, begin.fit.model, max_iterations=4).excess  # to the observer that is asked now
         if state.excess > NOTHING * state.floor and state.excess > min(LITTLE * missing, CLEARLY * state.floor):
             state, steps = with_best_laws(track, state, steps, tell)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ..effect import Effect
-from ..effects import EFFECTS
+from ..effects import by_name
 
-__all__ = ["NATS_PER_PARAMETER", "PER_PARAMETER", "further_parameters", "n_free"]
+__all__ = ["NATS_PER_PARAMETER", "PER_PARAMETER", "further_parameters", "law_of_form", "n_free"]
 
 PER_PARAMETER = 0.012
 """Statistical, of what is missing above the floor: the price of a parameter."""
@@ -20,7 +20,12 @@ def n_free(effect: Effect) -> int:
 
 def further_parameters(effect: Effect) -> int:
     """By how many parameters that a fit moves a form of a law has more than that law; 0 for what is no form of another."""
-    if not effect.form_of:
-        return 0
-    law = next(each for each in EFFECTS.values() if each.id == effect.id and each.law == effect.form_of)
-    return max(n_free(effect) - n_free(law), 0)
+    law = law_of_form(effect)
+    return 0 if law is None else max(n_free(effect) - n_free(law), 0)
+
+
+def law_of_form(effect: Effect) -> Effect | None:
+    """The law of which ``effect`` is a form; None for what is no form of another, or of one that asks for other values."""
+    law = by_name(effect.id, effect.form_of) if effect.form_of else None
+    known = {p.name for p in effect.parameters}
+    return law if law is not None and all(p.name in known for p in law.parameters) else None

@@ -45,7 +45,7 @@ def laws_beside(held: Term, scales: Scales) -> Iterator[Term]:
     for law in EFFECTS.values():
         if law.id != held.effect.id or law.key == held.effect.key or law.near:
             continue
-        if law in worth_trying() and held.effect in worth_trying():
+        if law in worth_trying() and held.effect in worth_trying() and law.form_of != held.effect.law:
             continue  # both are tried otherwise
         if law.form_of not in ("", held.effect.law):
             continue

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..model import Model, Term
 from .candidates import Scales, candidates, scales_of
+from .costs import law_of_form
 from .deadline import is_over
 from .fitting import State, bounds_of, free_names, refit, without_place
 from .indifference import dearer
@@ -30,6 +31,7 @@ __all__ = [
     "Settled",
     "Step",
     "audit",
+    "by_simpler_laws",
     "exchanged",
     "is_nothing",
     "merged",
@@ -154,6 +156,26 @@ def merged(track: Track, begin: State, state: State, steps: list[Step]) -> tuple
         return state, steps
     step = replace(old[0], term=name_of(one.fit.model, effect), after=_after_both(old[0], old[-1]))
     return one, [*(each for each in steps if each not in old), step]
+
+
+def by_simpler_laws(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step]]:
+    """``state`` with the laws that its terms are forms of, where these leave as much; and ``steps``, whose names stay.
+
+    A form came while something else was missing; beside that, what it has beyond its law may be nothing.
+    """
+    for step in steps:
+        model = state.fit.model
+        if step.term not in model.prefixes:
+            continue
+        place = model.prefixes.index(step.term)
+        held, law = model.terms[place], law_of_form(model.terms[place].effect)
+        if law is None:
+            continue
+        simpler = Term(law, tuple(law.values(held.by_name)))
+        one = refit(track, model.with_terms(simpler if k == place else each for k, each in enumerate(model.terms)))
+        if one.left - state.left <= max(OF_FLOOR * state.floor, TO_STAY * begin.excess):
+            state = one
+    return state, steps
 
 
 def _after_both(first: Step, last: Step) -> float:
