@@ -17,13 +17,19 @@ def test_every_effect_of_the_vocabulary_is_tried() -> None:
 def test_no_law_is_tried_twice_and_none_that_another_stands_for() -> None:
     keys = [each.key for each in worth_trying()]
     assert len(keys) == len(set(keys))
-    assert not any(each.near or each.form_of for each in worth_trying())
+    assert not any(each.near for each in worth_trying())
+    assert all(each.shows_alone for each in worth_trying() if each.form_of)
 
 
 def test_of_an_effect_with_a_usual_law_only_that_one_is_tried() -> None:
-    assert laws("stribeck") == ["exponential"]
     assert laws("presliding") == ["lugre"]
     assert laws("saturation") == ["hard"]
+
+
+def test_a_form_that_shows_where_its_law_does_not_is_tried_beside_it() -> None:
+    """Friction that differs by direction at low speed alone shows where the directions differ nowhere else."""
+    assert laws("stribeck") == ["directional", "exponential"]
+    assert laws("asymmetry") == ["linear", "low_speed"]
 
 
 def test_without_a_usual_law_all_are_tried_that_do_not_come_near_another() -> None:
