@@ -282,7 +282,6 @@ KNOWN: dict[str, Case] = {
         for name in (
             *(f"prove {each}" for each in ("--variant mixed --out mixed", "--calibrate proof --calibrate mixed --out learnt")),
             *(f"prove --cases {each} --out proof" for each in ("300 --seed 110", "100 --seed 20261126")),
-            "prove --variant dirt --cases 24 --seed 2711 --at-most 75 --out dirt",
             *("prove --inject bags/slide --model config/nominal_model.yaml --out proof", "bench long-recordings", "compile"),
             *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),
             *(f"bench {each}" for each in ("batch", "wall-time", "tensor-product-control", "compensation", "circle", "peers")),
