@@ -258,16 +258,8 @@ KNOWN: dict[str, Case] = {
     },
     f"{_PLANT} -p model_file:=config/contact_model.yaml": Case(node="plant"),
     **{
-        f"{_PLANT} --params-file config/{name}.yaml": Case(node="plant", long=name != "plant")
-        for name in (
-            "plant",
-            "guideway_plant",
-            "pneumatic_plant",
-            "quarter_car_plant",
-            "test_bed_plant",
-            "pendulum_plant",
-            "cart_pendulum_plant",
-        )
+        f"{_PLANT} --params-file config/{of}plant.yaml": Case(node="plant", long=of != "")
+        for of in ("", "guideway_", "pneumatic_", "quarter_car_", "test_bed_", "pendulum_", "cart_pendulum_")
     },
     **{
         f"fric model {what}": Case()
@@ -285,6 +277,7 @@ KNOWN: dict[str, Case] = {
             *("prove --inject bags/slide --model config/nominal_model.yaml --out proof", "bench long-recordings", "compile"),
             *(f"bench {each}" for each in ("lock-step", "recordings", "fitting", "laws", "online", "faults", "faults --graph")),
             *(f"bench {each}" for each in ("batch", "wall-time", "tensor-product-control", "compensation", "circle", "peers")),
+            *("bench soak", "bench soak-wall"),
             *(f"bench calibration{it}" for it in ("", "-oscillation", "-forced", "-static", "-two-stage", "-tensor-product")),
         )
     },

@@ -20,7 +20,7 @@ class Benchmark:
         run: gives its figures.
         long: takes minutes: run only when named, or with all the others when all are asked for.
         sized: gives its figures for a size that the user gives; None where it is fixed.
-        size: what ``sized`` counts, the name of the option: ``recordings``, ``hours`` or ``cases``.
+        size: what ``sized`` counts, the name of the option: ``recordings``, ``hours``, ``cases`` or ``minutes``.
     """
 
     id: str

@@ -36,6 +36,9 @@ def bench(
         int | None, typer.Option("--hours", help="With 'long-recordings': the length of the only recording, in h.")
     ] = None,
     cases: Annotated[int | None, typer.Option("--cases", help="With 'sparse-regression': how many simulated axes.")] = None,
+    minutes: Annotated[
+        int | None, typer.Option("--minutes", help="With 'soak' and 'soak-wall': how long the graph runs, in min.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed and accuracy on this machine; exit status 1 when a goal is missed."""
@@ -52,7 +55,7 @@ def bench(
     for name in chosen:
         if name not in BENCHMARKS:
             raise InputError("fric bench", f"no benchmark '{name}'", f"choose from {', '.join(BENCHMARKS)}")
-    sizes = {"recordings": recordings, "hours": hours, "cases": cases}
+    sizes = {"recordings": recordings, "hours": hours, "cases": cases, "minutes": minutes}
     for what, size in sizes.items():
         takers = [name for name, benchmark in BENCHMARKS.items() if benchmark.sized and benchmark.size == what]
         if size is not None and (size < 1 or not set(takers) & set(chosen)):

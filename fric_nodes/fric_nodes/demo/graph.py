@@ -97,6 +97,11 @@ class Graph:
             self.stop()
         self._kill()
 
+    @property
+    def processes(self) -> dict[str, int]:
+        """Number of the process of each node."""
+        return {name: child.pid for name, child in self._children.items()}
+
     def start(self, node: NodeSetup) -> None:
         """Start one more node."""
         with (self._logs / f"{node.name}.log").open("wb") as log:
