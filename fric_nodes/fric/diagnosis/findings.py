@@ -6,14 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from ..effect import Effect
+from ..effect import Effect, Place
 from ..effects import EFFECTS
 from ..model import Model, Term
 from .candidates import FRICTION, Scales, candidates, place_of
 from .component import Signature, agreed, signatures
 from .confidence import MANY, confidence_of, unknown_confidence
 from .differences import Contradiction
-from .fitting import refit
+from .fitting import MOTOR_FRICTION, refit
 from .growth import Growth
 from .held_back import OnlyThere
 from .judging import HARDLY, difference_of
@@ -143,11 +143,22 @@ def finding_of(
         component=place_of(effect),
         share=share,
         evidence=_evidence(effect, step, rival, excess, len(growth.steps) == 1),
-        parameters=parameters,
+        parameters=parameters | _of_motor(effect, end),
         noe_before=scored.noe_refit,
         noe_after=scored.noe_augmented,
         term=step.term,
     )
+
+
+def _of_motor(effect: Effect, end: Model) -> dict[str, Estimate]:
+    """Friction of the motor itself, which a transmission shows, where there is any."""
+    if effect.place is not Place.TRANSMISSION:
+        return {}
+    return {
+        p.name: Estimate(p.value, end.standard_errors.get(p.name), p.declaration.unit(end.units))
+        for p in end.parameters()
+        if p.name in MOTOR_FRICTION and p.value != 0.0
+    }
 
 
 def _evidence(effect: Effect, step: Step, rival: Rival | None, excess: float, alone: bool) -> str:

@@ -20,6 +20,7 @@ from .track import Track
 from .twin import twins
 
 __all__ = [
+    "MOTOR_FRICTION",
     "NOTHING",
     "N_TWINS",
     "Beginning",
@@ -82,14 +83,26 @@ class State:
         return max(self.left - self.floor, 0.0)
 
 
+MOTOR_FRICTION = ("motor_coulomb", "motor_viscous")
+"""Of a plant with a transmission: the motor's own Coulomb and viscous friction."""
+
+
 def is_driven(model: Model) -> bool:
     """True when the model has two bodies because it has a transmission."""
     return model.has_transmission
 
 
 def free_names(model: Model) -> tuple[str, ...]:
-    """The parameters that a fit moves: all but shapes, and the share of the mass behind a transmission."""
-    return tuple(p.name for p in model.parameters() if not p.declaration.shape or (p.name == "load_share" and is_driven(model)))
+    """The parameters that a fit moves: all but shapes, the share of the mass behind a transmission, and the motor's friction.
+
+    That is held where there is none: a fit doesn't bring it by itself (:mod:`.motor_side`).
+    """
+    return tuple(
+        p.name
+        for p in model.parameters()
+        if (not p.declaration.shape or (p.name == "load_share" and is_driven(model)))
+        and not (p.name in MOTOR_FRICTION and p.value == 0.0)
+    )
 
 
 def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
@@ -202,7 +215,7 @@ def shaken(track: Track, fit: Fit, bounds: Bounds, floor: float) -> Fit:
         if p.declaration.positive:
             low[k] = max(low[k], 1e-3 * abs(float(fit.model.values[k])))
     # What a recording tells well anyway must not be drawn far: it would drown what the others do.
-    spread = np.array([1.0 if "." in name or name == "load_share" else _WELL_KNOWN for name in fit.names])
+    spread = np.array([1.0 if "." in name or name in ("load_share", *MOTOR_FRICTION) else _WELL_KNOWN for name in fit.names])
     best, left = fit, float(fit.residual @ fit.residual)
     for _ in range(_ROUNDS):
         before = left

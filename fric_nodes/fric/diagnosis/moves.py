@@ -17,7 +17,8 @@ from ..model import Model, Term
 from .candidates import scales_of
 from .costs import NATS_PER_PARAMETER
 from .deadline import is_over
-from .fitting import NOTHING, State, bounds_of, refit, without_place
+from .fitting import NOTHING, State, bounds_of, free_names, refit, without_place
+from .motor_side import with_friction_divided
 from .other_laws import laws_in_place, told
 from .price import implausible
 from .settle import TO_STAY
@@ -45,7 +46,7 @@ class _Search:
         left, model = state.left, state.fit.model
         if not math.isfinite(left) or left <= 0.0:
             return -math.inf
-        price = NATS_PER_PARAMETER * sum(not p.declaration.shape for p in model.parameters())
+        price = NATS_PER_PARAMETER * sum(name != "load_share" for name in free_names(model))
         off = max(implausible(self.track.masses, model) - implausible(self.track.masses, self.begin.fit.model), 0.0)
         return -0.5 * self.track.independent * (math.log(left / self.begin.left) + off) - price
 
@@ -135,6 +136,8 @@ def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str],
             continue
         if is_over() or search.state.excess < NOTHING * search.state.floor:
             break
+        if search.taken(with_friction_divided(track, search.state)):
+            continue
         if not (search.taken(search.elsewhere()) or search.taken(search.other_laws())):
             break
     return search.state

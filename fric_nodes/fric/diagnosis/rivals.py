@@ -16,6 +16,7 @@ from ..model import Model
 from .candidates import Scales
 from .fitting import State, bounds_of, free_names, is_driven, shaken, unseen
 from .least_squares import Fit
+from .motor_side import better_divided
 from .offered import offered
 from .other_forms import extended, shaped, that_give, with_play
 from .price import OF_FLOOR
@@ -175,7 +176,8 @@ def _first_fit(track: Track, state: State, model: Model, scales: Scales) -> Fit:
     if is_driven(model) and not is_driven(state.fit.model):
         starts = [model.with_value("load_share", share) for share in _SHARES]
     fits = [track.fit(start, free_names(start), 4, bounds_of(start, scales)) for start in starts]
-    return min(fits, key=lambda fit: float(fit.residual @ fit.residual))
+    best = min(fits, key=lambda fit: float(fit.residual @ fit.residual))
+    return better_divided(track, best) if len(starts) > 1 else best
 
 
 def _steps(rival: Rival) -> bool:

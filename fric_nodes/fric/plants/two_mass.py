@@ -26,6 +26,7 @@ from ..engine.transmission import TRANSMISSION_FUNCTIONS, driven_step
 from ..parameter import Parameter
 from ..plant import Plant, Signal
 from ..record import Array
+from .rigid_driven import MOTOR_COULOMB, MOTOR_VISCOUS
 
 __all__ = ["PLANT"]
 
@@ -82,8 +83,8 @@ _TEST_BED = Plant(
         Parameter(
             "load_mass", "m_l", "F s^2/x", "mass or moment of inertia of the load", positive=True, linear=True, shape=True
         ),
-        Parameter("motor_coulomb", "F_m", "F", "Coulomb friction of the motor itself", lower=0.0, default=0.0, linear=True),
-        Parameter("motor_viscous", "c_m", "F s/x", "viscous friction of the motor itself", lower=0.0, default=0.0, linear=True),
+        MOTOR_COULOMB,
+        MOTOR_VISCOUS,
     ),
     states=("position", "velocity", "motor_position", "motor_velocity"),
     functions=(*TRANSMISSION_FUNCTIONS, step, drive),
