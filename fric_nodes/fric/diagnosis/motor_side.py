@@ -19,8 +19,7 @@ from .track import Track
 
 __all__ = ["better_divided", "moved_to_motor", "undivided", "with_friction_divided"]
 
-_PART = 0.5  # of the friction given to the load, with which that of the motor begins
-_ROUGHLY = 4  # iterations of a first fit, as others of a new transmission
+_PAIRS = tuple(zip(MOTOR_FRICTION, ("coulomb.force", "viscous.coefficient"), strict=True))  # of motor and load
 
 
 def undivided(model: Model) -> bool:
@@ -29,12 +28,12 @@ def undivided(model: Model) -> bool:
 
 
 def moved_to_motor(model: Model) -> Model:
-    """``model`` with a part of the load's Coulomb and viscous friction on the motor's side; else the model itself."""
+    """``model`` with half of the load's Coulomb and viscous friction on the motor's side; else the model itself."""
     divided = model
-    for mine, of_load in zip(MOTOR_FRICTION, ("coulomb.force", "viscous.coefficient"), strict=True):
+    for mine, of_load in _PAIRS:
         if of_load in model.names and model.value(of_load) > 0.0:
-            whole = model.value(of_load)
-            divided = divided.with_value(mine, _PART * whole).with_value(of_load, (1.0 - _PART) * whole)
+            half = 0.5 * model.value(of_load)
+            divided = divided.with_value(mine, half).with_value(of_load, half)
     return divided
 
 
@@ -45,7 +44,7 @@ def better_divided(track: Track, fit: Fit) -> Fit:
     start = moved_to_motor(fit.model)
     if start is fit.model:
         return fit
-    divided = track.fit(start, free_names(start), _ROUGHLY, bounds_of(start, scales_of(track)))
+    divided = track.fit(start, free_names(start), 4, bounds_of(start, scales_of(track)))
     price = NATS_PER_PARAMETER * (len(divided.names) - len(fit.names))
     left, before = (float(each.residual @ each.residual) for each in (divided, fit))
     return divided if left > 0.0 and left < before * math.exp(-2.0 * price / track.independent) else fit
@@ -59,7 +58,12 @@ def with_friction_divided(track: Track, state: State) -> list[tuple[str, State]]
         return [] if start is model else [("friction of the motor", refit(track, start))]
     if not model.has_transmission or not all(name in model.names for name in MOTOR_FRICTION):
         return []
-    bare = model
-    for name in MOTOR_FRICTION:
-        bare = bare.with_value(name, 0.0)
-    return [("no friction of the motor", refit(track, bare))]
+    return [("no friction of the motor", refit(track, _all_on_load(model)))]
+
+
+def _all_on_load(model: Model) -> Model:
+    for mine, of_load in _PAIRS:
+        if of_load in model.names:
+            model = model.with_value(of_load, model.value(of_load) + model.value(mine))
+        model = model.with_value(mine, 0.0)
+    return model
