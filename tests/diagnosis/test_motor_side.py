@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from fric.diagnosis import diagnose
-from fric.diagnosis.fitting import MOTOR_FRICTION, State, free_names, refit
-from fric.diagnosis.motor_side import better_divided, moved_to_motor, undivided, with_friction_divided
+from fric.diagnosis.fitting import State, free_names, refit
+from fric.diagnosis.motor_side import MOTOR_FRICTION, all_on_load, half_on_motor, undivided
 from fric.diagnosis.track import Track
 from fric.model import Model, Term, build_model, term
 from fric.record import Record
@@ -36,11 +36,23 @@ class _Body:
         self.position += dt * self.speed
 
 
-def record(seed: int, duration: float, of_motor: tuple[float, float], of_load: tuple[float, float]) -> Record:
-    """The motor's position: two bodies of 1 kg, a play of 0.6 mm with stops that give by 2 um, a PD controller at 500 Hz.
+PLAY = (1.7766e6, 942.0, 6e-4)
+"""Stiffness [N/m], damping [N s/m] and play [m] of a transmission: stops that give by 2 um."""
+SHAFT = (1.2e4, 5.0, 0.0)
+
+
+def record(
+    seed: int,
+    duration: float,
+    of_motor: tuple[float, float],
+    of_load: tuple[float, float],
+    between: tuple[float, float, float] = PLAY,
+) -> Record:
+    """The motor's position: two bodies of 1 kg under a PD controller of the motor at 500 Hz.
 
     ``of_motor`` and ``of_load`` are dry [N] and viscous [N s/m] friction.
     """
+    stiffness, damping, gap = between
     h, fine = 2e-3, 60
     t, planned = h * np.arange(round(duration / h)), np.random.default_rng(seed)
     wanted = np.zeros_like(t)
@@ -57,9 +69,9 @@ def record(seed: int, duration: float, of_motor: tuple[float, float], of_load: t
         u = force[k] = 8e3 * (wanted[k] - motor.position) + 120.0 * (rate[k] - motor.speed)
         for _ in range(fine):
             ahead = motor.position - load.position
-            beyond = ahead - math.copysign(min(3e-4, abs(ahead)), ahead)
-            pressed = 1.7766e6 * beyond + 942.0 * (motor.speed - load.speed) if beyond else 0.0
-            pressed = 0.0 if pressed * beyond < 0.0 else pressed
+            beyond = ahead - math.copysign(min(0.5 * gap, abs(ahead)), ahead)
+            pressed = stiffness * beyond + damping * (motor.speed - load.speed) if beyond or not gap else 0.0
+            pressed = 0.0 if gap and pressed * beyond < 0.0 else pressed
             motor.move(u - pressed, h / fine)
             load.move(pressed, h / fine)
     seen = np.round((position + 2e-7 * noise.standard_normal(t.size)) / 1e-7) * 1e-7
@@ -75,14 +87,19 @@ def test_the_friction_is_divided_without_a_change_of_its_sum() -> None:
     model = rigid(GAP)
     assert undivided(model)
     assert not set(MOTOR_FRICTION) & set(free_names(model))
-    divided = moved_to_motor(model)
+    divided = half_on_motor(model)
+    assert divided is not None
     assert not undivided(divided)
     assert set(MOTOR_FRICTION) <= set(free_names(divided))
     assert divided.value("motor_coulomb") + divided.value("coulomb.force") == 6.0
     assert divided.value("motor_viscous") + divided.value("viscous.coefficient") == 22.0
-    assert not undivided(rigid())
-    bare = build_model("rigid", {"mass": 2.0}, [GAP])
-    assert moved_to_motor(bare) is bare
+    together = all_on_load(divided)
+    assert together is not None
+    assert together.values.tolist() == model.values.tolist()
+    assert half_on_motor(divided) is None
+    assert all_on_load(model) is None
+    assert half_on_motor(rigid()) is None
+    assert half_on_motor(build_model("rigid", {"mass": 2.0}, [GAP])) is None
 
 
 @pytest.fixture(scope="module")
@@ -95,20 +112,21 @@ def both() -> dict[str, tuple[Track, State]]:
     return found
 
 
-def test_friction_of_the_motor_comes_where_it_is_and_goes_where_it_is_not(both: dict[str, tuple[Track, State]]) -> None:
+def test_friction_of_the_motor_pays_where_it_is_and_not_where_it_is_not(both: dict[str, tuple[Track, State]]) -> None:
     track, state = both["divided"]
-    assert better_divided(track, state.fit) is not state.fit
-    ((_, divided),) = with_friction_divided(track, state)
+    start = half_on_motor(state.fit.model)
+    assert start is not None
+    divided = refit(track, start)
     assert divided.left < 0.1 * state.left
     values = {name: divided.fit.model.value(name) for name in (*MOTOR_FRICTION, "coulomb.force")}
     assert values == pytest.approx({"motor_coulomb": 3.0, "motor_viscous": 10.0, "coulomb.force": 4.0}, rel=0.2)
-    ((_, bare),) = with_friction_divided(track, divided)
-    assert undivided(bare.fit.model)
-    assert bare.left > 5.0 * divided.left
+    together = all_on_load(divided.fit.model)
+    assert together is not None
+    assert refit(track, together).left > 5.0 * divided.left
     track, state = both["load's"]
-    assert better_divided(track, state.fit) is state.fit
-    ((_, divided),) = with_friction_divided(track, state)
-    assert divided.left > 0.9 * state.left
+    start = half_on_motor(state.fit.model)
+    assert start is not None
+    assert refit(track, start).left > 0.9 * state.left
 
 
 def test_a_play_between_two_bodies_that_rub_is_found() -> None:
@@ -120,3 +138,14 @@ def test_a_play_between_two_bodies_that_rub_is_found() -> None:
     true = {"backlash.gap": 6e-4, "motor_coulomb": 3.0, "motor_viscous": 10.0}
     assert values == pytest.approx(true, rel=0.1)
     assert result.validation.noe_augmented < 1.5 * result.validation.noise_floor
+
+
+def test_a_shaft_between_two_bodies_that_rub_is_no_presliding() -> None:
+    of = (3.0, 10.0), (4.0, 15.0), SHAFT
+    result = diagnose([record(1, 15.0, *of)], [record(7, 10.0, *of)], rigid())
+    assert [each.effect for each in result.findings] == ["compliance"]
+    assert result.findings[0].confidence > 0.5
+    values = {name: each.value for name, each in result.findings[0].parameters.items()}
+    assert values["compliance.stiffness"] == pytest.approx(1.2e4, rel=0.05)
+    assert values["motor_coulomb"] == pytest.approx(3.0, rel=0.05)
+    assert result.model.value("coulomb.force") == pytest.approx(4.0, rel=0.05)

@@ -26,7 +26,17 @@ from .motion import smooth
 from .track import Track
 from .worth_trying import worth_trying
 
-__all__ = ["FRICTION", "Candidate", "Scales", "candidates", "fewest_cycles", "scales_of", "values_to_try"]
+__all__ = [
+    "FRICTION",
+    "Candidate",
+    "Scales",
+    "candidates",
+    "closer",
+    "fewest_cycles",
+    "scales_of",
+    "trials_of",
+    "values_to_try",
+]
 
 FRICTION = "guideway friction"
 """The component that rubs."""
@@ -137,9 +147,9 @@ def candidates(model: Model, scales: Scales) -> list[Candidate]:
             continue  # a spring beyond a play is the same as elastic stops, and one play is enough
         if effect.level is not None and effect.remember is not None and not has_level:
             continue  # what friction gains at rest, or follows late, is relative to a level
-        trials = tuple(Term(effect, values) for values in _values(effect, scales))
+        trials = trials_of(effect, scales)
         if effect.play is not None and model.encoder != ENCODERS[0]:
-            trials = tuple(_closer(trials))
+            trials = tuple(closer(trials))
         if play and effect.link is not None:
             trials = tuple(_stops(trials[0], scales))
         if trials:
@@ -147,11 +157,16 @@ def candidates(model: Model, scales: Scales) -> list[Candidate]:
     return found
 
 
-def _closer(trials: Sequence[Term]) -> Iterator[Term]:
+def trials_of(effect: Effect, scales: Scales) -> tuple[Term, ...]:
+    """Terms of ``effect`` with all the values that a recording of these ``scales`` suggests."""
+    return tuple(Term(effect, values) for values in _values(effect, scales))
+
+
+def closer(trials: Sequence[Term]) -> Iterator[Term]:
     """``trials``, and one in the geometric middle of each two.
 
     Where the load is measured, the motor crosses a play unseen. When it arrives is all that tells the play: what is a little
-    too wide, or too narrow, lacks as much as none.
+    too wide, or too narrow, lacks as much as none. So does a spring that swings at the wrong times.
     """
     yield trials[0]
     for before, after in itertools.pairwise(trials):

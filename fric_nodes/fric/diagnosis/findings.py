@@ -13,11 +13,12 @@ from .candidates import FRICTION, Scales, candidates, place_of
 from .component import Signature, agreed, signatures
 from .confidence import MANY, confidence_of, unknown_confidence
 from .differences import Contradiction
-from .fitting import MOTOR_FRICTION, refit
+from .fitting import refit
 from .growth import Growth
 from .held_back import OnlyThere
 from .judging import HARDLY, difference_of
 from .locate import Where, locate
+from .motor_side import MOTOR_FRICTION
 from .presence import Presence
 from .result import (
     Diagnosis,

@@ -12,15 +12,15 @@ from ..model import Model, Term
 from ..record import Array
 from ..threads import mapped
 from .along import Along
-from .candidates import Scales, fewest_cycles, scales_of
+from .candidates import Scales, closer, fewest_cycles, scales_of, trials_of
 from .indifference import dearer
 from .least_squares import Bounds, Fit
+from .motor_side import MOTOR_FRICTION, half_on_motor
 from .screen import Gram, Tried, blocks_of, restraint
 from .track import Track
 from .twin import twins
 
 __all__ = [
-    "MOTOR_FRICTION",
     "NOTHING",
     "N_TWINS",
     "Beginning",
@@ -81,10 +81,6 @@ class State:
     def excess(self) -> float:
         """What is missing, above the floor [F^2]."""
         return max(self.left - self.floor, 0.0)
-
-
-MOTOR_FRICTION = ("motor_coulomb", "motor_viscous")
-"""Of a plant with a transmission: the motor's own Coulomb and viscous friction."""
 
 
 def is_driven(model: Model) -> bool:
@@ -153,16 +149,26 @@ def begun(track: Track, fit: Fit, tried: Sequence[Tried], scales: Scales, along:
     """The fitted model with the candidates where it lacks least.
 
     At the screening's values for the candidates, at its values for all parameters, with room made for what has passed for
-    something else, or, where the motion tells, at values fitted along it.
+    something else, or, where the motion tells, at values fitted along it; behind a new transmission also with half of the
+    friction on the motor's side.
     """
     grown = fit.model.with_terms((*fit.model.terms, *(_start(each) for each in tried)))
     starts = [grown, _moved(grown, fit, tried[0]), *with_room(fit.model, [each.column.term for each in tried])]
     if along.can(grown):
         names = free_names(grown)
         starts.append(along.fitted(grown, names, track.scale(grown, names), bounds_of(grown, scales)))
+    shared = [grown, *(fit.model.with_terms((*fit.model.terms, spring)) for spring in _springs(tried, scales))]
+    starts += [divided for divided in map(half_on_motor, shared) if divided is not None]
     lacks = [float(np.sum(track.residual(model) ** 2)) for model in starts]
     best = int(np.argmin(lacks))
     return Beginning(starts[best], lacks[best])
+
+
+def _springs(tried: Sequence[Tried], scales: Scales) -> tuple[Term, ...]:
+    """Trials of a transmission that is a spring: with the friction on the wrong side, its screening chose the wrong one."""
+    effect = tried[0].column.term.effect
+    spring = len(tried) == 1 and effect.link is not None and effect.play is None
+    return tuple(closer(trials_of(effect, scales))) if spring else ()
 
 
 def with_room(model: Model, terms: Sequence[Term]) -> list[Model]:

@@ -8,16 +8,12 @@ Source: the two-mass model of a drive with friction of motor and load.
 
 from __future__ import annotations
 
-import math
-
 from ..model import Model
-from .candidates import scales_of
-from .costs import NATS_PER_PARAMETER
-from .fitting import MOTOR_FRICTION, State, bounds_of, free_names, refit
-from .least_squares import Fit
-from .track import Track
 
-__all__ = ["better_divided", "moved_to_motor", "undivided", "with_friction_divided"]
+__all__ = ["MOTOR_FRICTION", "all_on_load", "half_on_motor", "undivided"]
+
+MOTOR_FRICTION = ("motor_coulomb", "motor_viscous")
+"""Of a plant with a transmission: the motor's own Coulomb and viscous friction."""
 
 _PAIRS = tuple(zip(MOTOR_FRICTION, ("coulomb.force", "viscous.coefficient"), strict=True))  # of motor and load
 
@@ -27,41 +23,25 @@ def undivided(model: Model) -> bool:
     return model.has_transmission and all(name in model.names and model.value(name) == 0.0 for name in MOTOR_FRICTION)
 
 
-def moved_to_motor(model: Model) -> Model:
-    """``model`` with half of the load's Coulomb and viscous friction on the motor's side; else the model itself."""
+def half_on_motor(model: Model) -> Model | None:
+    """``model`` with half of the load's Coulomb and viscous friction on the motor's side.
+
+    None where it has neither, no transmission, or friction of the motor already.
+    """
+    if not undivided(model):
+        return None
     divided = model
     for mine, of_load in _PAIRS:
         if of_load in model.names and model.value(of_load) > 0.0:
             half = 0.5 * model.value(of_load)
             divided = divided.with_value(mine, half).with_value(of_load, half)
-    return divided
+    return None if divided is model else divided
 
 
-def better_divided(track: Track, fit: Fit) -> Fit:
-    """``fit``, or one that begins at it with friction of the motor where that is worth its parameters."""
-    if not undivided(fit.model):
-        return fit
-    start = moved_to_motor(fit.model)
-    if start is fit.model:
-        return fit
-    divided = track.fit(start, free_names(start), 4, bounds_of(start, scales_of(track)))
-    price = NATS_PER_PARAMETER * (len(divided.names) - len(fit.names))
-    left, before = (float(each.residual @ each.residual) for each in (divided, fit))
-    return divided if left > 0.0 and left < before * math.exp(-2.0 * price / track.independent) else fit
-
-
-def with_friction_divided(track: Track, state: State) -> list[tuple[str, State]]:
-    """``state`` with friction of the motor, or without it where it has some, everything else fitted anew."""
-    model = state.fit.model
-    if undivided(model):
-        start = moved_to_motor(model)
-        return [] if start is model else [("friction of the motor", refit(track, start))]
-    if not model.has_transmission or not all(name in model.names for name in MOTOR_FRICTION):
-        return []
-    return [("no friction of the motor", refit(track, _all_on_load(model)))]
-
-
-def _all_on_load(model: Model) -> Model:
+def all_on_load(model: Model) -> Model | None:
+    """``model`` with the motor's friction on the load's side; None where the motor has none."""
+    if not any(name in model.names and model.value(name) > 0.0 for name in MOTOR_FRICTION):
+        return None
     for mine, of_load in _PAIRS:
         if of_load in model.names:
             model = model.with_value(of_load, model.value(of_load) + model.value(mine))

@@ -18,7 +18,7 @@ from .candidates import scales_of
 from .costs import NATS_PER_PARAMETER
 from .deadline import is_over
 from .fitting import NOTHING, State, bounds_of, free_names, refit, without_place
-from .motor_side import with_friction_divided
+from .motor_side import all_on_load, half_on_motor
 from .other_laws import laws_in_place, told
 from .price import implausible
 from .settle import TO_STAY
@@ -102,6 +102,12 @@ class _Search:
             for factor in _FACTORS
         ]
 
+    def other_side(self) -> list[tuple[str, State]]:
+        """With half of the friction on the motor's side of a transmission, or with none there."""
+        model = self.state.fit.model
+        tried = {"friction of the motor": half_on_motor(model), "no friction of the motor": all_on_load(model)}
+        return [(what, refit(self.track, start)) for what, start in tried.items() if start is not None]
+
     def other_laws(self) -> list[tuple[str, State]]:
         """Each term by each other law of its effect; the best of these also with each other term taken away.
 
@@ -136,7 +142,7 @@ def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str],
             continue
         if is_over() or search.state.excess < NOTHING * search.state.floor:
             break
-        if search.taken(with_friction_divided(track, search.state)):
+        if search.taken(search.other_side()):
             continue
         if not (search.taken(search.elsewhere()) or search.taken(search.other_laws())):
             break

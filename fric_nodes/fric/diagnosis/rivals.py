@@ -14,9 +14,10 @@ import numpy as np
 
 from ..model import Model
 from .candidates import Scales
+from .costs import NATS_PER_PARAMETER
 from .fitting import State, bounds_of, free_names, is_driven, shaken, unseen
 from .least_squares import Fit
-from .motor_side import better_divided
+from .motor_side import half_on_motor
 from .offered import offered
 from .other_forms import extended, shaped, that_give, with_play
 from .price import OF_FLOOR
@@ -177,7 +178,18 @@ def _first_fit(track: Track, state: State, model: Model, scales: Scales) -> Fit:
         starts = [model.with_value("load_share", share) for share in _SHARES]
     fits = [track.fit(start, free_names(start), 4, bounds_of(start, scales)) for start in starts]
     best = min(fits, key=lambda fit: float(fit.residual @ fit.residual))
-    return better_divided(track, best) if len(starts) > 1 else best
+    return _divided(track, best, scales) if len(starts) > 1 else best
+
+
+def _divided(track: Track, fit: Fit, scales: Scales) -> Fit:
+    """``fit``, or one that begins at it with friction of the motor where that is worth its parameters."""
+    start = half_on_motor(fit.model)
+    if start is None:
+        return fit
+    divided = track.fit(start, free_names(start), 4, bounds_of(start, scales))
+    price = NATS_PER_PARAMETER * (len(divided.names) - len(fit.names))
+    left, before = (float(each.residual @ each.residual) for each in (divided, fit))
+    return divided if left > 0.0 and left < before * math.exp(-2.0 * price / track.independent) else fit
 
 
 def _steps(rival: Rival) -> bool:
