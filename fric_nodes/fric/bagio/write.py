@@ -28,6 +28,7 @@ from ruamel.yaml import YAML
 
 from ..record import Record
 from .checks import Stamps
+from .chunk_index import ChunkIndex
 from .encode import float64_messages, joint_state_messages, reference_messages
 from .errors import WriteError
 from .types import FLOAT64, JOINT_STATE, REFERENCE, definition
@@ -221,6 +222,7 @@ def _prepare(writer: Writer, custom: Mapping[str, str]) -> None:
         content = _text("fric") + struct.pack("<I", len(pairs)) + pairs
         storage.bio.write(struct.pack("<BQ", 0x0C, len(content)) + content)
         storage.bio.flush()
+        storage.chunks = ChunkIndex(storage.path.parent)
     elif isinstance(storage, Sqlite3Writer):
         storage.conn.close()
         storage.conn = sqlite3.connect(storage.path, check_same_thread=False)  # every use is under the writer's lock
