@@ -4,10 +4,15 @@ An executor of rclpy rebuilds its wait set for every round and starts a coroutin
 100 us of processor time per message. A recorder or an identifier doesn't need to react to each message at once, so its
 subscriptions are kept off the wait set and emptied from a timer instead: the middleware receives into the subscription's queue
 on its own thread, and one message then costs about 2 us to take. The queue must hold what comes between two rounds.
+
+The events executor of rclpy asks no callback group: it hands over each message as it comes. Such messages are kept, and
+taken in the next round like the others.
 """
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from typing import Any, NamedTuple
@@ -85,10 +90,11 @@ class BulkSubscription:
         self._class = message_class(msgtype)
         self._node = node
         self._group = _OffTheWaitSet()
+        self._handed_over: deque[Taken] = deque(maxlen=qos.depth)
         self._subscription: Any = node.create_subscription(
             self._class,
             topic,
-            lambda message: None,
+            self._keep,
             qos,
             callback_group=self._group,
             # Event handlers are waitables of their own and would cost the wait set what was saved above.
@@ -96,12 +102,19 @@ class BulkSubscription:
             raw=raw,
         )
 
+    def _keep(self, payload: Any) -> None:
+        # Time of reception and sequence could be asked for, but the events executor of rclpy 7.1 fails on handing them over.
+        self._handed_over.append(Taken(payload, time.time_ns(), None))
+
     def take(self, limit: int) -> Iterator[Taken]:
         """Take out what has been received, at most ``limit`` messages, oldest first."""
         handle = self._subscription.handle
         take: Callable[[Any, bool], Any] = handle.take_message
         with handle:
             for _ in range(limit):
+                if self._handed_over:
+                    yield self._handed_over.popleft()
+                    continue
                 taken = take(self._class, self._raw)
                 if taken is None:
                     return
