@@ -28,7 +28,7 @@ VOCABULARY = {
     *("load_dependence", "position_dependence", "time_drift", "temperature", "accel_hysteresis", "bias", "ripple"),
     *("shear_thinning", "gear_friction"),
     *("backlash", "impact_backlash", "compliance", "stiffness", "nonlinear_stiffness"),
-    *("actuator_lag", "delay", "saturation", "input_deadzone", "unknown"),
+    *("actuator_lag", "delay", "saturation", "input_deadzone", "gain_ripple", "unknown"),
 }
 ALL = pytest.mark.parametrize("effect", EFFECTS.values(), ids=list(EFFECTS))
 SPEEDS = [sign * speed for speed in (0.0, 1e-12, 1e-6, 1e-3, 0.1, 10.0, 1e3) for sign in (1.0, -1.0)]
@@ -37,7 +37,7 @@ STEPS = (1e-7, 1e-3, 0.1, 100.0)
 FIRST = {"level": 2, "force": 1, "slip": 6, "command": 4, "uncommand": 1, "play": 0, "link": 4, "remember": 3, "prepare": 2}
 # What may act at each place.
 ROLES = {
-    Place.COMMAND_PATH: {"command"},
+    Place.COMMAND_PATH: {"command", "force"},
     Place.TRANSMISSION: {"link", "play", "force"},
     Place.SLIP_LEVEL: {"level", "force"},
     Place.SLIP_DYNAMICS: {"slip", "level"},

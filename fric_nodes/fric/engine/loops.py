@@ -113,13 +113,13 @@ def predict(
         load_k = load[k] if load.shape[0] > 1 else load[0]
         temperature_k = temperature[k] if temperature.shape[0] > 1 else temperature[0]
         direction = 1.0 if v[k] > 0.0 else (-1.0 if v[k] < 0.0 else 0.0)
-        c = Context(q[k], v[k], direction, t[k], load_k, temperature_k, a[k], h, memory, 0.0)
-        rest = drive(p, q[k], v[k], a[k]) + force(c, p)
-        push = without = 0.0
-        # Friction is a straight line over the force that pushes, on either side of none: with none, with what is found then,
+        motion = drive(p, q[k], v[k], a[k])
+        rest = push = without = 0.0
+        # Forces are straight lines over the force that pushes, on either side of none: with none, with what is found then,
         # and where the line through both gives what pushed.
         for trial in range(3 if PUSHED and pushed(p) else 1):
             c = Context(q[k], v[k], direction, t[k], load_k, temperature_k, a[k], h, memory, push)
+            rest = motion + force(c, p)
             friction = direction * level_sum(c, p) if RIGID else slip(z, z_next, v[k], h, level_sum(c, p), constants, p)
             if trial == 0:
                 without = push = rest + friction

@@ -74,6 +74,7 @@ def _driven(p: Any, s: Any, late: Any, u: float, h: float, count: int, disturbed
         f /= 1.0 + p.heat * s[_HEAT]
     if p.gain_ripple != 0.0:
         f *= 1.0 + p.gain_ripple * math.sin(2.0 * math.pi * (s[_Y] if p.load_share > 0.0 else s[_Q]) / p.gain_ripple_period)
+    f *= max(1.0 - p.fading * abs(s[_W] if p.load_share > 0.0 else s[_V]), 0.0)
     return float(f * (1.0 - p.dip * disturbed))
 
 

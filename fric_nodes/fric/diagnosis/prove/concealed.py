@@ -221,6 +221,11 @@ def _ripple(at: Setting, random: np.random.Generator, form: int) -> Callable[[fl
     }
 
 
+def _gain_ripple(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
+    period = at.travel * float(random.uniform(0.08, 0.2))
+    return lambda s: {"gain_ripple": min(0.15 * s, 0.6), "gain_ripple_period": period}
+
+
 def _backlash(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
     share = float(random.uniform(0.35, 0.7))
     return lambda s: {"load_share": share, "gap": 0.002 * s * at.travel}
@@ -335,6 +340,7 @@ _CATALOGUE = (
     Concealed("delay", _delay, group="command"),
     Concealed("saturation", _saturation, forms=2, foreign=(1,), group="command", largest=8.0),
     Concealed("input_deadzone", _input_deadzone, forms=2, foreign=(1,), group="command"),
+    Concealed("gain_ripple", _gain_ripple, group="place"),
 )  # fmt: skip
 
 CONCEALED: dict[str, Concealed] = {each.effect: each for each in _CATALOGUE}

@@ -1,8 +1,8 @@
 """Physics outside the vocabulary: what no effect of the registry equals, and where it sits.
 
 The right answer to these is ``unknown`` together with the place. Each is a fault or a property that machines have: a part that
-is picked up, a motor that heats up, a supply that dips, a drag chain, dirt, a floor that shakes, a motor whose gain repeats
-over position, grease that thins while it is being sheared, an encoder that doesn't run true.
+is picked up, a motor that heats up, a supply that dips, a drag chain, dirt, a floor that shakes, a motor that fades
+with speed, grease that thins while it is being sheared, an encoder that doesn't run true.
 """
 
 from __future__ import annotations
@@ -70,9 +70,8 @@ def _floor(at: Setting, random: np.random.Generator, form: int) -> Callable[[flo
     return lambda s: {"floor": 0.2 * s * at.friction, "floor_frequency": frequency}
 
 
-def _gain(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
-    period = at.travel * float(random.uniform(0.08, 0.2))
-    return lambda s: {"gain_ripple": min(0.15 * s, 0.6), "gain_ripple_period": period}
+def _fading(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
+    return lambda s: {"fading": min(0.2 * s, 0.8) / at.top_speed}
 
 
 def _thixotropy(at: Setting, random: np.random.Generator, form: int) -> Callable[[float], Changes]:
@@ -97,7 +96,7 @@ _CATALOGUE = (
     Outside("cable_chain", "a drag chain that pulls on one side, with play", _cable, _LOAD),
     Outside("dirt", "dirt on the guideway at times", _dirt, _GUIDEWAY, windows=True),
     Outside("floor_vibration", "a floor that shakes at a fixed frequency", _floor, _LOAD),
-    Outside("gain_ripple", "a motor whose gain repeats over position", _gain, _MOTOR),
+    Outside("fading", "a motor that gives less force the faster it runs", _fading, _MOTOR),
     Outside("thixotropy", "grease that thins while it is sheared", _thixotropy, _GUIDEWAY),
     Outside("eccentricity", "an encoder that runs out of true", _eccentricity, frozenset({"sensor"})),
 )  # fmt: skip

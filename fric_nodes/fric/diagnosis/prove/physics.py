@@ -58,6 +58,7 @@ class Physics:
         floor, floor_frequency: force from outside [N], [Hz].
         gear, gear_driven, gear_form: friction per force that drives the body, and, in form 1, that is driven back by it.
         gain_ripple, gain_ripple_period: relative change of the drive's gain over position, [m].
+        fading: relative loss of the drive's gain per speed of the motor [s/m].
         thixotropy, thixotropy_time, thixotropy_shear: viscous coefficient at rest [N s/m], [s], [1/m].
         eccentricity, eccentricity_period: error of the encoder [m], [m].
         elements: of pre-sliding of kinds 2 and 3, each with its share of the level and of the stiffness.
@@ -146,6 +147,7 @@ class Physics:
     gear_form: float = 0.0
     gain_ripple: float = 0.0
     gain_ripple_period: float = 1.0
+    fading: float = 0.0
     thixotropy: float = 0.0
     thixotropy_time: float = 1.0
     thixotropy_shear: float = 0.0

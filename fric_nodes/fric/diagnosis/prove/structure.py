@@ -124,6 +124,7 @@ _MADE: Mapping[str, Callable[[Physics], Term]] = {
     "delay": lambda p: term("delay", time=p.delay),
     "saturation": lambda p: term("saturation", limit=p.limit),
     "input_deadzone": lambda p: term("input_deadzone", width=p.dead_zone),
+    "gain_ripple": lambda p: term("gain_ripple", sine=p.gain_ripple, period=p.gain_ripple_period),
 }
 
 

@@ -34,7 +34,7 @@ _EVERY = (
     *("gap", "stop_stiffness", "stop_damping", "shaft", "shaft_damping"),
     *("appendage", "appendage_frequency", "appendage_damping", "limit", "dead_zone", "delay", "actuator_time"),
     *("payload", "payload_time", "heat", "heat_time", "heat_force", "dip", "cable", "cable_play", "cable_position", "dirt"),
-    *("floor", "floor_frequency", "gear", "gain_ripple", "gain_ripple_period"),
+    *("floor", "floor_frequency", "gear", "gain_ripple", "gain_ripple_period", "fading"),
     *("thixotropy", "thixotropy_time", "thixotropy_shear", "eccentricity", "eccentricity_period"),
 )
 # ``gear_driven`` acts in another form alone. A level that jumps with the sign of the acceleration (``acceleration``) isn't
@@ -128,6 +128,8 @@ def _motor_force(p: Any, x: Any, now: Any, u: float) -> float:
     if p.gain_ripple != 0.0:
         at = x[_Y] if p.load_share > 0.0 else x[_Q]
         f += f * p.gain_ripple * math.sin(_TURN * at / p.gain_ripple_period)
+    if p.fading > 0.0:
+        f -= f * min(p.fading * abs(x[_W] if p.load_share > 0.0 else x[_V]), 1.0)
     return float(f * (1.0 - p.dip) if now[_DIRTY] > 0.0 else f)
 
 

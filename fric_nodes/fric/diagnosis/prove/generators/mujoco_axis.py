@@ -49,7 +49,7 @@ _EVERY = (
     *("gap", "stop_stiffness", "stop_damping", "shaft", "shaft_damping"),
     *("appendage", "appendage_frequency", "appendage_damping", "limit", "dead_zone", "delay", "actuator_time"),
     *("payload", "payload_time", "heat", "heat_time", "heat_force", "dip", "cable", "cable_play", "cable_position", "dirt"),
-    *("floor", "floor_frequency", "gear", "gain_ripple", "gain_ripple_period"),
+    *("floor", "floor_frequency", "gear", "gain_ripple", "gain_ripple_period", "fading"),
     *("thixotropy", "thixotropy_time", "thixotropy_shear", "eccentricity", "eccentricity_period"),
 )
 # ``gear_driven`` acts in another form alone.

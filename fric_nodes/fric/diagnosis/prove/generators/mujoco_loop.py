@@ -83,7 +83,7 @@ def _controlled(
 
 
 @compiled
-def _driving(p: Any, m: Any, line: Any, u: float, q: float, disturbed: bool, h: float, count: int) -> float:
+def _driving(p: Any, m: Any, line: Any, u: float, q: float, v: float, disturbed: bool, h: float, count: int) -> float:
     """Force [N] of the motor."""
     f = u
     if p.limit > 0.0:
@@ -101,6 +101,7 @@ def _driving(p: Any, m: Any, line: Any, u: float, q: float, disturbed: bool, h: 
         m[_HEAT] -= math.expm1(-h / p.heat_time) * ((u / p.heat_force) ** 2 - m[_HEAT])
         f = f / (1.0 + p.heat * m[_HEAT])
     f *= 1.0 + p.gain_ripple * math.sin(_TWO_PI * q / p.gain_ripple_period)
+    f *= max(1.0 - p.fading * abs(v), 0.0)
     if disturbed:
         f -= p.dip * f
     return float(f)
@@ -241,7 +242,7 @@ def run(
             before = v
             motor = q + at[1] if p.load_share > 0.0 else q
             applied[:] = 0.0
-            f = _driving(p, m, line, m[_U], motor, disturbed, h, count)
+            f = _driving(p, m, line, m[_U], motor, v + rate[1] if p.load_share > 0.0 else v, disturbed, h, count)
             drive = _between(p, at, rate, f, applied)
             braking = _braking(p, m, q, v, t)
             way = math.copysign(1.0, v) if abs(v) > rest else math.copysign(1.0, drive - braking)
