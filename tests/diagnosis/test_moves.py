@@ -13,6 +13,7 @@ from .small_axis import NOMINAL, followed, with_terms
 DRAG = term("quadratic_drag", coefficient=15.0)
 BENT = term("stribeck", "exponential", force=6.0, velocity=0.15, exponent=1.0)
 """A surplus that falls as the plain exponential of the speed."""
+HYSTERESIS = term("accel_hysteresis", force=3.0, velocity=0.1)
 ROUND = term("stribeck", "exponential", force=6.0, velocity=0.15, exponent=2.0)
 
 
@@ -59,6 +60,14 @@ def test_a_law_that_is_the_wrong_one_gives_way_and_takes_what_mended_it_along() 
     assert found.fit.model.value("stribeck.exponent") == 1.0
     assert found.fit.model.value("stribeck.force") == pytest.approx(6.0, rel=0.1)
     assert found.fit.model.value("stribeck.velocity") == pytest.approx(0.15, rel=0.1)
+
+
+@pytest.mark.parametrize("truth", [ROUND, HYSTERESIS], ids=["another name", "its own"])
+def test_an_effect_gives_way_to_the_one_that_it_looks_like(truth: Term) -> None:
+    track, begin, state = begun(truth, DRAG, grown=(HYSTERESIS, DRAG))
+    found = reconsidered(track, begin, state, lambda _: None, names_only=True)
+    names = {"stribeck" if truth is ROUND else "accel_hysteresis", "quadratic_drag"}
+    assert set(found.fit.model.prefixes) - set(NOMINAL.prefixes) == names
 
 
 def test_a_fit_that_ended_in_the_wrong_valley_is_begun_from_elsewhere() -> None:

@@ -15,7 +15,7 @@ from ..model import Model
 from .adding import extended_by_terms, grown_on, settled_again
 from .deadline import is_over
 from .faint import faint_term
-from .fitting import NOTHING, added, best_track, refit, without_place
+from .fitting import NOTHING, State, added, best_track, refit, without_place
 from .growth import AGAIN, FAINTLY, LITTLE, Growth, share_left
 from .moves import reconsidered
 from .price import implausible
@@ -107,29 +107,37 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
         tell: told what is done.
     """
     left = growth.end.excess
-    if (
-        is_over()
-        or not growth.steps
-        or left < max(NOTHING * growth.end.floor, LITTLE * growth.begin.excess)
-        or growth.rest > HOPELESS
-    ):
+    if is_over() or not growth.steps or left < NOTHING * growth.end.floor or growth.rest > HOPELESS:
         return growth
-    tell("reconsidering its laws and values")
-    state = reconsidered(growth.track, growth.begin, growth.end, tell)
+    little = left < LITTLE * growth.begin.excess
+    tell("reconsidering its names" if little else "reconsidering its laws and values")
+    state = reconsidered(growth.track, growth.begin, growth.end, tell, names_only=little)
     if state is growth.end:
         return growth
+    more = settled_again(replace(growth, end=state, steps=_steps_of(growth, state)))
+    return more if more.steps and more.price < growth.price else growth
+
+
+def _steps_of(growth: Growth, state: State) -> tuple[Step, ...]:
+    """The steps of ``growth`` as steps to ``state``, whose terms are among those or have come in the place of one."""
     model = state.fit.model
     brought = added(growth.begin.fit.model, model)
-    steps = []
-    for step in growth.steps:
+    places: dict[int, int] = {}
+    for number, step in enumerate(growth.steps):
         place = next((k for k in brought if model.terms[k].effect.id == step.term.split("#")[0]), None)
         if place is not None:
             brought.remove(place)
-            without = refit(growth.track, without_place(model, place), max_iterations=8)
-            beside = without.left, state.left, without.floor, without.excess
-            steps.append(Step(model.prefixes[place], *beside, step.rivals, step.screened, step.price))
-    more = settled_again(replace(growth, end=state, steps=tuple(steps)))
-    return more if more.steps and more.price < growth.price else growth
+            places[number] = place
+    gone = [number for number in range(len(growth.steps)) if number not in places]
+    places |= dict(zip(gone, brought, strict=False))
+    steps = []
+    for number, place in sorted(places.items()):
+        step = growth.steps[number]
+        without = refit(growth.track, without_place(model, place), max_iterations=8)
+        beside = without.left, state.left, without.floor, without.excess
+        rivals = tuple(each for each in step.rivals if each.effect.id != model.terms[place].effect.id)
+        steps.append(Step(model.prefixes[place], *beside, rivals, step.screened, step.price))
+    return tuple(steps)
 
 
 def _best_growth(

@@ -1,10 +1,11 @@
 """A grown model reconsidered by moves on one score: a term less, another law, other values to begin with.
 
 What explained most when it came may only have mended what was not there yet, and the law by which it came may keep terms alive
-that mend its form. So a structure isn't final because its terms came in a good order: every term may go again or give way to
-another law of its effect, with everything fitted anew each time. All structures are judged by one number on one observer: the
-logarithm of the likelihood of blocks that the fit has not seen, less a price for each parameter and for a mass far from the one
-given. The observer has to be fast: a slow one lets a model stick and slip in its own way, and a wrong one may then leave less.
+that mend its form. So a structure is not final because its terms came in a good order: each may go or give way to another
+law of its effect, or to an effect with a similar trace, with everything fitted anew each time. All structures are judged by one
+number on one observer: the logarithm of the likelihood of blocks that the fit has not seen, less a price for each parameter and
+for a mass far from the one given. The observer has to be fast: a slow one lets a model stick and slip in its own way, and a
+wrong one may then leave less.
 """
 
 from __future__ import annotations
@@ -14,13 +15,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from ..model import Model, Term
-from .candidates import scales_of
+from .along import Along
+from .candidates import Candidate, candidates, scales_of
 from .costs import NATS_PER_PARAMETER
 from .deadline import is_over
-from .fitting import NOTHING, State, bounds_of, free_names, refit, without_place
+from .fitting import NOTHING, State, begun, bounds_of, free_names, refit, without_place
 from .motor_side import all_on_load, half_on_motor
 from .other_laws import laws_in_place, told
-from .price import implausible
+from .price import OF_FLOOR, implausible
+from .screen import screen
 from .settle import TO_STAY
 from .track import Track
 
@@ -55,16 +58,17 @@ class _Search:
         """Places of the terms that may go again."""
         return [k for k, held in enumerate(self.state.fit.model.terms) if held.effect.key not in self.own]
 
-    def taken(self, made: Iterable[tuple[str, State]]) -> bool:
+    def taken(self, made: Iterable[tuple[str, State]], at_least: float | None = None) -> bool:
         """Whether the best of the moves is clearly better, and then is where the search goes on.
 
-        What doesn't make the structure smaller must take off a real part of what was missing, too.
+        What doesn't make the structure smaller must take off ``at_least`` so much, too [F^2]; a real part of what was missing,
+        if not given.
         """
         best = max(made, key=lambda each: self.score(each[1]), default=None)
         if best is None or self.score(best[1]) <= self.score(self.state) + _CLEARLY:
             return False
         smaller = len(best[1].fit.model.terms) < len(self.state.fit.model.terms)
-        if not smaller and self.state.left - best[1].left < TO_STAY * self.begin.excess:
+        if not smaller and self.state.left - best[1].left < (TO_STAY * self.begin.excess if at_least is None else at_least):
             return False
         self.tell(f"{best[0]}: better by {self.score(best[1]) - self.score(self.state):.0f} nats")
         self.state = best[1]
@@ -125,8 +129,35 @@ class _Search:
         fewer = [(f"{what}, {which}", state) for what, k, whole in made[:_LAWS] for which, state in self.without_each(whole, k)]
         return [*((what, state) for what, _, state in made), *fewer]
 
+    def renamed(self) -> bool:
+        """Whether an effect has taken the place of one that it looks like.
 
-def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str], None]) -> State:
+        It explains the same, so that it needn't take off much of what was missing: what tells them apart may be a few turns.
+        """
+        return self.taken(self.look_alikes(), OF_FLOOR * self.state.floor)
+
+    def look_alikes(self) -> list[tuple[str, State]]:
+        """Each term with the effects that have a similar trace in its place, from all values that the recordings suggest.
+
+        While another term was missing, or at first order, the wrong one may have promised more.
+        """
+        model, scales, along = self.state.fit.model, scales_of(self.track), Along(self.track)
+        made = []
+        for k in self.brought:
+            held = model.terms[k].effect
+            without = refit(self.track, without_place(model, k))
+            like = [each for each in candidates(without.fit.model, scales) if each.effect.id in held.looks_like]
+            alone = [Candidate(each.effect, (trial,)) for each in like for trial in each.trials]
+            for effect_id in dict.fromkeys(each.effect.id for each in like):
+                of_it = [each for each in alone if each.effect.id == effect_id]
+                tried = screen(self.track, without.fit, of_it, without.chance, in_pairs=False).tried
+                starts = [begun(self.track, without.fit, [each], scales, along).model for each in tried[:_LAWS]]
+                states = [refit(self.track, start) for start in starts]
+                made += [(f"{effect_id} in the place of {held.id}", state) for state in states]
+        return made
+
+
+def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str], None], names_only: bool = False) -> State:
     """The best structure that moves from ``state`` come to.
 
     Args:
@@ -134,9 +165,13 @@ def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str],
         begin: the fitted nominal model, whose terms stay.
         state: a fitted model with all of its terms and more.
         tell: told what is done.
+        names_only: only exchange terms for effects that look like them.
     """
     own = frozenset(held.effect.key for held in begin.fit.model.terms)
     search = _Search(track, begin, state, own, tell)
+    if names_only:
+        search.renamed()
+        return search.state
     for _ in range(_MOVES):
         if search.taken(search.without_each(search.state)):
             continue
@@ -144,6 +179,6 @@ def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str],
             break
         if search.taken(search.other_side()):
             continue
-        if not (search.taken(search.elsewhere()) or search.taken(search.other_laws())):
+        if not (search.taken(search.elsewhere()) or search.taken(search.other_laws()) or search.renamed()):
             break
     return search.state
