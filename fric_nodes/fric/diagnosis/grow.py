@@ -110,7 +110,7 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
     if is_over() or not growth.steps or left < NOTHING * growth.end.floor or growth.rest > HOPELESS:
         return growth
     little = left < LITTLE * growth.begin.excess
-    tell("reconsidering its names" if little else "reconsidering its laws and values")
+    tell("comparing its effects with those that look like them" if little else "reconsidering its laws and values")
     state = reconsidered(growth.track, growth.begin, growth.end, tell, names_only=little)
     if state is growth.end:
         return growth

@@ -1,32 +1,25 @@
 """Gain ripple: an actuator that gives more force at some places than at others, again and again along the travel.
 
 Equation: f = (1 + A cos(2 pi q / L) + B sin(2 pi q / L)) u, with u the force by the nominal gain. What the motor adds to it is
-F = -(A cos + B sin) u, a force on the body. Over a step at constant velocity, which takes the phase from p - d to p + d, the
-mean of the wave is its value at p times sin(d)/d exactly. Behind a transmission the wave is laid on the force that this passes
-on, over the position of the load.
+F = -(A cos + B sin) u, a force on the body; over a step the wave has the mean that a force ripple has. Behind a transmission it
+is laid on the force that this passes on, over the position of the load.
 Source: torque constant of a brushless motor over its angle, one term per harmonic (torque ripple that is proportional to the
 current, in contrast to cogging, which is there without one).
 """
 
 from __future__ import annotations
 
-import math
-
 from ..effect import Context, Effect, Place
 from ..engine.kernel import kernel
 from ..parameter import Parameter
+from .ripple import force as wave
 
 __all__ = ["EFFECT"]
 
 
 @kernel
 def force(c: Context, cosine: float, sine: float, period: float) -> float:
-    wave = 2.0 * math.pi / period
-    phase = wave * c.position
-    reach = 0.5 * wave * c.velocity * c.step
-    r = reach * reach
-    mean = 1.0 - r * (1.0 / 6.0 - r * (1.0 / 120.0 - r / 5040.0)) if r < 0.01 else math.sin(reach) / reach
-    return -c.push * (cosine * math.cos(phase) + sine * math.sin(phase)) * mean
+    return -c.push * wave(c, cosine, sine, period)
 
 
 EFFECT = Effect(
