@@ -81,9 +81,7 @@ def by_parts(
     other = settled_again(proposed) if settles else replace(proposed, rest=rest)
     if growth is None:
         other = grown_faster(tracks, other, tell)
-        complete = (
-            len(other.steps) >= _TOGETHER and other.rest < AGAIN and implausible(other.track.masses, other.end.fit.model) == 0.0
-        )
+        complete = len(other.steps) >= _TOGETHER and other.rest < AGAIN and implausible(other.track, other.end.fit.model) == 0.0
         return replace(other, last=screened(other.track, other.end)) if complete else None
     left, least = (left_to_a_fast_observer(tracks, each) + each.dear for each in (other, growth))
     better = bool(other.steps) and left < least
@@ -104,7 +102,7 @@ def surpassing(tracks: Sequence[Track], proposed: Growth, growth: Growth) -> Gro
     if len(proposed.steps) < _TOGETHER:
         return None
     rest = audit(proposed.track, proposed.begin.fit.model, proposed.end.fit.model)
-    unlikely = max(rest, left_to_a_fast_observer(tracks, proposed)) + implausible(proposed.track.masses, proposed.end.fit.model)
+    unlikely = max(rest, left_to_a_fast_observer(tracks, proposed)) + implausible(proposed.track, proposed.end.fit.model)
     if unlikely >= left_to_a_fast_observer(tracks, growth):
         return None
     return replace(proposed, rest=rest, last=screened(proposed.track, proposed.end))

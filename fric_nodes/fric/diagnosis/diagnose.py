@@ -34,7 +34,7 @@ from .growth import Growth
 from .intake import of_use, refuse, without_faults
 from .judging import most_left
 from .ladder import ladder_of
-from .price import FAR_OFF, implausible
+from .price import FAR_OFF, strange
 from .reproduced import reproduced
 from .result import Diagnosis
 from .start import (
@@ -152,10 +152,11 @@ def _grown_by_all(tracks: Sequence[Track], start: Model, tell: Callable[[str], N
         return with_moves(complete, tell)
     better = surpassing(tracks, proposed, begun[1]) if proposed is not None else None
     if better is not None:
-        return better
+        return with_moves(better, tell)
     growth = with_moves(grow(tracks, start, tell, begun), tell)
     if growth.stands_out and (growth.beyond > 0.0 or growth.rest > most_left(growth)):
-        return by_parts(tracks, proposed or together(tracks, start, tell), tell, growth) or growth
+        other = by_parts(tracks, proposed or together(tracks, start, tell), tell, growth)
+        return growth if other is None or other is growth else with_moves(other, tell)
     return growth
 
 
@@ -191,7 +192,7 @@ def _holds_inertia(found: Diagnosis, nominal: Model, train: Sequence[Record]) ->
     Observers count what a body lacks in the force that moves it: one without mass never lacks anything. And a limit or a dead
     zone that swallows nearly all of the force says the same in other words.
     """
-    if implausible((nominal.total_inertia,), found.model) > FAR_OFF:
+    if strange((nominal.total_inertia,), found.model) > FAR_OFF:
         return False
     effort = np.concatenate([record.effort[record.mask] for record in train])
     passed = effort[:: max(effort.shape[0] // _LOOKED_AT, 1)]

@@ -19,7 +19,8 @@ from .fitting import NOTHING, State, added, best_track, refit, without_place
 from .growth import AGAIN, FAINTLY, LITTLE, Growth, share_left
 from .moves import reconsidered
 from .price import implausible
-from .settle import CLEARLY, HOPELESS, Step, audit
+from .reproduced import reproduced
+from .settle import CLEARLY, HOPELESS, Step, audit, compared
 from .track import Track
 
 __all__ = ["first_terms", "grow", "grown_faster", "leaves_much", "left_beyond", "with_moves"]
@@ -107,15 +108,24 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
         tell: told what is done.
     """
     left = growth.end.excess
-    if is_over() or not growth.steps or left < NOTHING * growth.end.floor or growth.rest > HOPELESS:
-        return growth
-    little = left < LITTLE * growth.begin.excess
+    nothing = left < NOTHING * growth.end.floor
+    if is_over() or not growth.steps or (nothing and len(growth.steps) == 1) or growth.rest > HOPELESS:
+        return growth  # one term alone has been compared with all of its rivals
+    little = nothing or left < LITTLE * growth.begin.excess
     tell("comparing its effects with those that look like them" if little else "reconsidering its laws and values")
     state = reconsidered(growth.track, growth.begin, growth.end, tell, names_only=little)
     if state is growth.end:
         return growth
-    more = settled_again(replace(growth, end=state, steps=_steps_of(growth, state)))
-    return more if more.steps and more.price < growth.price else growth
+    more = reproduced(replace(growth, end=state, steps=_steps_of(growth, state), rest=_rest_of(growth, state)))
+    # The moves have paid for their parameters in nats; halves of the recordings must not speak against what came of them.
+    if not more.steps or more.rest > growth.rest + max(growth.dear - more.dear, 0.0):
+        return growth
+    return replace(more, steps=compared(more.track, more.begin, more.end, more.steps))
+
+
+def _rest_of(growth: Growth, state: State) -> float:
+    """Share of what is missing that ``state`` lacks too, where it was not fitted."""
+    return audit(growth.track, growth.begin.fit.model, state.fit.model)
 
 
 def _steps_of(growth: Growth, state: State) -> tuple[Step, ...]:
@@ -167,7 +177,7 @@ def _compared(tracks: Sequence[Track], start: Growth, first: Growth, tell: Calla
 
     for other in first.beginnings:
         best, lacks = best_of_all()
-        lacks += implausible(best.track.masses, best.end.fit.model)
+        lacks += implausible(best.track, best.end.fit.model)
         if is_over() or len(tried) > _OTHER_BEGINNINGS or lacks < (AGAIN if best.ended else _AGAIN_FOR_MORE):
             break
         if begun & {name.split("#")[0] for name in other.names}:

@@ -88,7 +88,7 @@ class Growth:
     def dear(self) -> float:
         """The price of its parameters, and of what is implausible about it."""
         n = sum(not p.shape for held in self.end.fit.model.terms for p in held.effect.parameters)
-        return PER_PARAMETER * n + implausible(self.track.masses, self.end.fit.model)
+        return PER_PARAMETER * n + implausible(self.track, self.end.fit.model)
 
 
 def share_left(growth: Growth) -> float:

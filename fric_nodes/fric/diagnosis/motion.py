@@ -22,7 +22,7 @@ from ..identification.innovations import Run
 from ..model import Model
 from ..record import Array
 
-__all__ = ["SMOOTH", "Motion", "Past", "along", "motion_of", "smooth"]
+__all__ = ["SMOOTH", "Motion", "Past", "along", "friction_along", "motion_of", "smooth"]
 
 SMOOTH = 4.0
 """Numerical, times the observer's bandwidth [rad/s]: cutoff of the motion along which a model is led."""
@@ -88,12 +88,26 @@ def along(
         velocity: there [x/s], shape ``(n,)``; it may differ from that of ``motion``, for example in its sign at rest.
         states: the model's inner states at the beginning; they are updated in place to those at the end.
     """
+    return _predicted(model, run, time, motion, velocity, states)[0]
+
+
+def friction_along(model: Model, run: Run, time: Array, motion: Motion, states: tuple[Array, Array]) -> Array:
+    """The part of that force that comes from the slip levels [F], shape ``(n,)``; arguments as those of :func:`along`.
+
+    Without slip dynamics it is their sum in the direction of motion, also where that is below zero.
+    """
+    return _predicted(model, run, time, motion, motion.velocity, states)[1]
+
+
+def _predicted(
+    model: Model, run: Run, time: Array, motion: Motion, velocity: Array, states: tuple[Array, Array]
+) -> tuple[Array, Array]:
     needed, friction = np.empty_like(velocity), np.empty_like(velocity)
     model.linked_loops.predict(
         model.linked, time - 0.5 * motion.step, motion.position, velocity, motion.acceleration,
         motion.step, run.load, run.temperature, *states, needed, friction,
     )  # fmt: skip
-    return needed
+    return needed, friction
 
 
 def smooth(signal: Array, step: float, cutoff: float) -> Array:

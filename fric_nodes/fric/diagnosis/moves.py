@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from ..effect import Effect
 from ..model import Model, Term
 from .along import Along
 from .candidates import Candidate, candidates, scales_of
@@ -22,7 +23,7 @@ from .deadline import is_over
 from .fitting import NOTHING, State, begun, bounds_of, free_names, refit, without_place
 from .motor_side import all_on_load, half_on_motor
 from .other_laws import laws_in_place, told
-from .price import OF_FLOOR, implausible
+from .price import implausible
 from .screen import screen
 from .settle import TO_STAY
 from .track import Track
@@ -50,7 +51,7 @@ class _Search:
         if not math.isfinite(left) or left <= 0.0:
             return -math.inf
         price = NATS_PER_PARAMETER * sum(name != "load_share" for name in free_names(model))
-        off = max(implausible(self.track.masses, model) - implausible(self.track.masses, self.begin.fit.model), 0.0)
+        off = max(implausible(self.track, model) - implausible(self.track, self.begin.fit.model), 0.0)
         return -0.5 * self.track.independent * (math.log(left / self.begin.left) + off) - price
 
     @property
@@ -58,17 +59,17 @@ class _Search:
         """Places of the terms that may go again."""
         return [k for k, held in enumerate(self.state.fit.model.terms) if held.effect.key not in self.own]
 
-    def taken(self, made: Iterable[tuple[str, State]], at_least: float | None = None) -> bool:
+    def taken(self, made: Iterable[tuple[str, State]], same: bool = False) -> bool:
         """Whether the best of the moves is clearly better, and then is where the search goes on.
 
-        What doesn't make the structure smaller must take off ``at_least`` so much, too [F^2]; a real part of what was missing,
-        if not given.
+        What doesn't make the structure smaller must take off a real part of what was missing, too, unless it is to explain the
+        ``same``.
         """
         best = max(made, key=lambda each: self.score(each[1]), default=None)
         if best is None or self.score(best[1]) <= self.score(self.state) + _CLEARLY:
             return False
         smaller = len(best[1].fit.model.terms) < len(self.state.fit.model.terms)
-        if not smaller and self.state.left - best[1].left < (TO_STAY * self.begin.excess if at_least is None else at_least):
+        if not (smaller or same) and self.state.left - best[1].left < TO_STAY * self.begin.excess:
             return False
         self.tell(f"{best[0]}: better by {self.score(best[1]) - self.score(self.state):.0f} nats")
         self.state = best[1]
@@ -129,12 +130,17 @@ class _Search:
         fewer = [(f"{what}, {which}", state) for what, k, whole in made[:_LAWS] for which, state in self.without_each(whole, k)]
         return [*((what, state) for what, _, state in made), *fewer]
 
+    def mended(self) -> bool:
+        """Whether other values or laws of the same effects have become the better ones."""
+        return self.taken(self.other_side()) or self.taken(self.elsewhere()) or self.taken(self.other_laws())
+
     def renamed(self) -> bool:
         """Whether an effect has taken the place of one that it looks like.
 
-        It explains the same, so that it needn't take off much of what was missing: what tells them apart may be a few turns.
+        It explains the same, so that it needn't take off any of what was missing: what tells them apart may be a few turns, or
+        that it needs fewer parameters.
         """
-        return self.taken(self.look_alikes(), OF_FLOOR * self.state.floor)
+        return self.taken(self.look_alikes(), same=True)
 
     def look_alikes(self) -> list[tuple[str, State]]:
         """Each term with the effects that have a similar trace in its place, from all values that the recordings suggest.
@@ -144,9 +150,11 @@ class _Search:
         model, scales, along = self.state.fit.model, scales_of(self.track), Along(self.track)
         made = []
         for k in self.brought:
+            if is_over():
+                break
             held = model.terms[k].effect
             without = refit(self.track, without_place(model, k))
-            like = [each for each in candidates(without.fit.model, scales) if each.effect.id in held.looks_like]
+            like = [each for each in candidates(without.fit.model, scales) if _alike(each.effect, held)]
             alone = [Candidate(each.effect, (trial,)) for each in like for trial in each.trials]
             for effect_id in dict.fromkeys(each.effect.id for each in like):
                 of_it = [each for each in alone if each.effect.id == effect_id]
@@ -157,6 +165,11 @@ class _Search:
         return made
 
 
+def _alike(one: Effect, other: Effect) -> bool:
+    """Whether either effect is named among those that look like the other: that holds both ways."""
+    return one.id in other.looks_like or other.id in one.looks_like
+
+
 def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str], None], names_only: bool = False) -> State:
     """The best structure that moves from ``state`` come to.
 
@@ -165,20 +178,20 @@ def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str],
         begin: the fitted nominal model, whose terms stay.
         state: a fitted model with all of its terms and more.
         tell: told what is done.
-        names_only: only exchange terms for effects that look like them.
+        names_only: only drop terms, or exchange them for effects that look like them.
     """
     own = frozenset(held.effect.key for held in begin.fit.model.terms)
     search = _Search(track, begin, state, own, tell)
-    if names_only:
-        search.renamed()
-        return search.state
     for _ in range(_MOVES):
         if search.taken(search.without_each(search.state)):
             continue
-        if is_over() or search.state.excess < NOTHING * search.state.floor:
+        if is_over():
             break
-        if search.taken(search.other_side()):
+        much = not names_only and search.state.excess >= NOTHING * search.state.floor
+        if much and (
+            search.taken(search.other_side()) or search.taken(search.elsewhere()) or search.taken(search.other_laws())
+        ):
             continue
-        if not (search.taken(search.elsewhere()) or search.taken(search.other_laws()) or search.renamed()):
+        if not search.renamed():
             break
     return search.state

@@ -2,7 +2,7 @@
 
 Amounts are sums of squares of the missing force [F^2]: shares of the ``excess``, which is what is missing above the floor, or
 of the ``floor``, which is what a twin leaves although its model is right. Each free parameter has a price. A model also pays
-for a mass far from the given one and for a transmission with hardly any mass behind it.
+for a mass far from the given one, for a transmission with hardly any mass behind it and for friction levels below zero.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from ..effect import Effect
 from ..model import Model
 from .costs import PER_PARAMETER, n_free
 from .fitting import State, is_driven
+from .levels import negative_friction
 from .screen import Tried
+from .track import Track
 
 __all__ = [
     "BY_CHANCE",
@@ -26,6 +28,7 @@ __all__ = [
     "implausible",
     "mass_off",
     "price_of",
+    "strange",
     "worth",
 ]
 
@@ -42,8 +45,17 @@ def price_of(effect: Effect, excess: float) -> float:
     return PER_PARAMETER * excess * n_free(effect)
 
 
-def implausible(masses: Sequence[float], model: Model) -> float:
+def implausible(track: Track, model: Model) -> float:
     """What speaks against ``model`` whatever it explains, as a share of what is missing.
+
+    That is a mass far from all that were given, a transmission with hardly any mass behind it, and friction whose level is
+    below zero along the motion that ``track`` holds.
+    """
+    return strange(track.masses, model) + negative_friction(track, model)
+
+
+def strange(masses: Sequence[float], model: Model) -> float:
+    """What the masses of ``model`` say against it, as a share of what is missing.
 
     That is a mass far from all ``masses`` [F s^2/x] that were given, and a transmission with hardly any mass behind it: between
     a spring that ends at a body and one that ends at friction, the first micrometres of a contact, no recording decides there.

@@ -71,7 +71,7 @@ def rival_of(track: Track, state: State, offer: tuple[Tried, ...], fit: Fit, fou
     """
     effects = [each.column.term.effect for each in offer]
     left = left_by(track, fit) * (found.unpaid if brings_slip(offer) else 1.0)
-    dear = sum(price_of(effect, state.excess) for effect in effects) + state.excess * implausible(track.masses, fit.model)
+    dear = sum(price_of(effect, state.excess) for effect in effects) + state.excess * implausible(track, fit.model)
     names = [name_of(fit.model, effect) for effect in effects]
     halfway = min((each.left for each in offer), default=left)
     return Rival(effects[0], left, fit, left, dear, offer, tuple(names), max(halfway, left), found.tried)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,7 @@ __all__ = [
     "Step",
     "audit",
     "by_simpler_laws",
+    "compared",
     "exchanged",
     "is_nothing",
     "merged",
@@ -123,6 +125,11 @@ def exchanged(track: Track, done: Settled) -> Settled:
     state, steps, gone = _pruned(track, done.begin, state, steps)
     rest = audit(track, done.begin.fit.model, state.fit.model)
     return _unless_worse(Settled(done.begin, state, tuple(steps), rest, (*done.gone, *gone)))
+
+
+def compared(track: Track, begin: State, state: State, steps: Sequence[Step]) -> tuple[Step, ...]:
+    """``steps`` to ``state`` with what their rivals come to in the place of each, which all stay."""
+    return tuple(_exchanged(track, begin, state, list(steps), scales_of(track), stay=True)[1])
 
 
 def _unless_worse(done: Settled) -> Settled:
@@ -227,7 +234,7 @@ def _on_other_half(track: Track, model: Model, twin: Twin | None = None) -> floa
 def _price(track: Track, model: Model, name: str, excess: float) -> float:
     """What the term ``name`` of ``model`` costs, as rivals pay it [F^2]."""
     effect = model.terms[list(model.prefixes).index(name)].effect
-    return price_of(effect, excess) + excess * implausible(track.masses, model)
+    return price_of(effect, excess) + excess * implausible(track, model)
 
 
 def _takes_its_place(track: Track, begin: State, without: State, state: State, own: float, rival: Rival) -> bool:
@@ -238,15 +245,20 @@ def _takes_its_place(track: Track, begin: State, without: State, state: State, o
     """
     if without.left - rival.left < _COMPARABLE * (without.left - state.left):
         return False
-    stranger = implausible(track.masses, rival.fit.model) - implausible(track.masses, state.fit.model)
+    stranger = implausible(track, rival.fit.model) - implausible(track, state.fit.model)
     more = max(stranger, 0.0) * max(begin.excess - without.excess, 0.0)
     # Twins that stick and slip each in its own way leave more than a recording does: no floor is higher than what is left.
     floor = min(state.floor, state.left, rival.left)
     return own - rival.score - more > max(OF_FLOOR * floor, TO_STAY * without.excess)
 
 
-def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scales: Scales) -> tuple[State, list[Step]]:
-    """Each term against its rivals with all the others there: what came first was chosen while the others were missing."""
+def _exchanged(
+    track: Track, begin: State, state: State, steps: list[Step], scales: Scales, stay: bool = False
+) -> tuple[State, list[Step]]:
+    """Each term against its rivals with all the others there: what came first was chosen while the others were missing.
+
+    If the terms are to ``stay``, they are only compared.
+    """
     for k in range(len(steps)):
         step, model = steps[k], state.fit.model
         if step.term not in model.prefixes:
@@ -258,7 +270,7 @@ def _exchanged(track: Track, begin: State, state: State, steps: list[Step], scal
         rivals = [rival for rival in rivals_of(track, without, found, scales, state.left) if rival.effect.id != effect_id]
         own = state.left + _price(track, state.fit.model, step.term, without.excess)
         term = step.term
-        if rivals and _takes_its_place(track, begin, without, state, own, rivals[0]):
+        if rivals and not stay and _takes_its_place(track, begin, without, state, own, rivals[0]):
             other = refit(track, rivals[0].fit.model, max_iterations=6)
             # What leaves something is not the simpler explanation beside one that leaves nothing.
             if state.excess > OF_FLOOR * state.floor or other.left - state.left < OF_FLOOR * state.floor:
@@ -302,7 +314,7 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
             without = refit(track, without_place(model, place), max_iterations=8)
             nothing = is_nothing(model.terms[place])
             # What leaves an axis of another mass behind has only changed what stands in for what.
-            stranger = implausible(track.masses, without.fit.model) - implausible(track.masses, state.fit.model)
+            stranger = implausible(track, without.fit.model) - implausible(track, state.fit.model)
             lost = without.left - state.left + begin.excess * max(stranger, 0.0)
             alone = lost > NEARLY_ALL * without.excess and without.excess > CLEARLY * without.floor
             little = OF_FLOOR * state.floor if alone else max(OF_FLOOR * state.floor, TO_STAY * begin.excess)

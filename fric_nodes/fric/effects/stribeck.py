@@ -59,6 +59,7 @@ EFFECT = Effect(
     rate=_rate,
     regime="low speed, both directions: more force than at moderate speed",
     looks_like={
+        "coulomb": "ladder of constant velocities: Stribeck friction falls on it, a Coulomb level stays",
         "dwell_time": "repeat reversals with rests of graded length: only dwell time makes break-away depend on the rest",
         "accel_hysteresis": "cross low speed speeding up and slowing down: a Stribeck curve is the same both ways",
         "frictional_lag": "cross low speed at graded accelerations: a lag opens a loop, the Stribeck curve alone is one line",

@@ -55,6 +55,7 @@ EFFECT = Effect(
     rate=_rate,
     regime="low speed: more force than at moderate speed, in one direction more than in the other",
     looks_like={
+        "coulomb": "ladder of constant velocities: Stribeck friction falls on it, a Coulomb level stays",
         "asymmetry": "slow and fast strokes both ways: plain asymmetry stays at moderate speed, this difference is gone there",
         "accel_hysteresis": "cross low speed speeding up and slowing down: this is the same both ways, in either direction",
         "dwell_time": "repeat reversals with rests of graded length: only dwell time makes break-away depend on the rest",

@@ -39,6 +39,7 @@ EFFECT = Effect(
     rate=_rate,
     regime="low speed, both directions: more force than at moderate speed, with a tail that falls as 1/v^2",
     looks_like={
+        "coulomb": "ladder of constant velocities: Stribeck friction falls on it, a Coulomb level stays",
         "dwell_time": "repeat reversals with rests of graded length: only dwell time makes break-away depend on the rest",
         "accel_hysteresis": "cross low speed speeding up and slowing down: a Stribeck curve is the same both ways",
     },

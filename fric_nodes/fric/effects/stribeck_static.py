@@ -34,6 +34,7 @@ EFFECT = Effect(
     level=level,
     regime="break-away: the force it takes to start moving, against the force right after",
     looks_like={
+        "coulomb": "ladder of constant velocities: Stribeck friction falls on it, a Coulomb level stays",
         "dwell_time": "repeat break-away after rests of graded length: plain static friction doesn't depend on the rest",
         "presliding": "look at the position before break-away: a stuck contact doesn't move, a pre-sliding one does",
     },
