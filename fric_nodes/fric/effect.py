@@ -111,7 +111,7 @@ class Effect:
         form_of: another law of the effect, in whose place alone a diagnosis tries this one; ``""``: it has a place of its own.
         shows_alone: True for a form that may show where the law that it is a form of hardly does: it is tried by itself, too.
         order: within its place, what comes first: 0 what adds up, 10 what lags, 20 what depends on direction, 30 what scales
-            the rest.
+            the rest, 40 what comes from another contact.
         level: see the module's docstring, as for all compiled functions; None when the effect doesn't contribute there.
         force: as ``level``.
         slip: as ``level``; at most one term of a model may have it.

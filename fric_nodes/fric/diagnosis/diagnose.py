@@ -111,6 +111,9 @@ def _diagnosed(train: Sequence[Record], validation: Sequence[Record], nominal: M
     growth = reproduced(_grown_by_all(searched, start, tell), tell)
     if growth.stands_out and (growth.beyond > 0.0 or growth.rest > most_left(growth)):
         growth = helped(searched, growth, tell)
+        if growth.unhelped is not None and growth.rest <= most_left(growth):
+            # With what was to help beside something unknown, nothing unknown is left.
+            growth = with_moves(replace(growth, unhelped=None), tell)
     if is_over():
         corrected.append("the search was ended after the time that was asked for: further effects may be missing")
     if parts is not None:

@@ -101,18 +101,34 @@ def grown_faster(tracks: Sequence[Track], growth: Growth, tell: Callable[[str], 
 
 
 def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
-    """``growth``, or what moves on one score make of it (:mod:`.moves`), where it leaves more than laws of another form would.
+    """``growth``, or what moves on one score make of it (:mod:`.moves`), in turn with further terms, as long as either helps.
 
     Args:
         growth: settled.
         tell: told what is done.
     """
+    while True:
+        moved = _moved(growth, tell)
+        left = moved.end.excess
+        if is_over() or not moved.steps or left < max(NOTHING * moved.end.floor, LITTLE * moved.begin.excess):
+            return moved
+        more = extended_by_terms([moved.track], moved, None, tell, most=len(moved.steps) + _TO_COMPARE)
+        if len(more.steps) == len(moved.steps):
+            return moved
+        growth = settled_again(more)
+        if not growth.steps or growth.price >= moved.price:
+            return moved
+
+
+def _moved(growth: Growth, tell: Callable[[str], None]) -> Growth:
+    """``growth``, or what moves on one score make of it; after the time for the search terms may still go, but none comes."""
     left = growth.end.excess
     nothing = left < NOTHING * growth.end.floor
-    if is_over() or not growth.steps or (nothing and len(growth.steps) == 1) or growth.rest > HOPELESS:
+    if not growth.steps or (nothing and len(growth.steps) == 1) or growth.rest > HOPELESS:
         return growth  # one term alone has been compared with all of its rivals
     little = nothing or left < LITTLE * growth.begin.excess
-    tell("comparing its effects with those that look like them" if little else "reconsidering its laws and values")
+    if not is_over():
+        tell("comparing its effects with those that look like them" if little else "reconsidering its laws and values")
     state = reconsidered(growth.track, growth.begin, growth.end, tell, names_only=little)
     if state is growth.end:
         return growth

@@ -129,6 +129,8 @@ def exchanged(track: Track, done: Settled) -> Settled:
 
 def compared(track: Track, begin: State, state: State, steps: Sequence[Step]) -> tuple[Step, ...]:
     """``steps`` to ``state`` with what their rivals come to in the place of each, which all stay."""
+    if is_over():
+        return tuple(steps)
     return tuple(_exchanged(track, begin, state, list(steps), scales_of(track), stay=True)[1])
 
 

@@ -24,6 +24,7 @@ EFFECT = Effect(
     id="gear_friction",
     law="directional",
     place=Place.SLIP_LEVEL,
+    order=40,
     title="friction that follows the driving force, by its direction",
     equation="g = mu_d |f| where f v > 0, else mu_b |f|",
     source="efficiencies of screws and worm gears; Duclusaud et al. 2024",

@@ -1,7 +1,8 @@
 """Friction that follows the driving force: gears, screws and belts rub the more the more force they pass on.
 
 Equation: g = mu |f|, on top of the other slip levels, with f the force that pushes the body: the actuator's, or what a
-transmission passes on. Driving takes 1/(1 - mu) times the force that it takes without; driven by the load, 1/(1 + mu) times
+transmission passes on. It is a contact of its own: what scales the friction of a guideway, over place, load or temperature,
+doesn't scale it. Driving takes 1/(1 - mu) times the force that it takes without; driven by the load, 1/(1 + mu) times
 the force comes back.
 Source: efficiency of gears and screws (Niemann and Winter, Machine Elements); the load-dependent part of servo gear friction,
 Duclusaud et al. 2024 (Better Actuator Models).
@@ -26,6 +27,7 @@ EFFECT = Effect(
     law="proportional",
     usual=True,
     place=Place.SLIP_LEVEL,
+    order=40,
     title="friction that follows the driving force",
     equation="g = mu |f|",
     source="efficiency of gears and screws; Duclusaud et al. 2024",
