@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fric.diagnosis.fitting import State
 from fric.diagnosis.least_squares import Fit
-from fric.diagnosis.price import earns, implausible, mass_off, price_of, worth
+from fric.diagnosis.price import earns, mass_off, price_of, strange, worth
 from fric.diagnosis.screen import Column, Tried
 from fric.identification.gauss_newton import Solution
 from fric.model import Model, build_model, term
@@ -58,10 +58,10 @@ def test_what_hangs_on_the_body_is_part_of_its_mass() -> None:
 
 
 def test_hardly_any_mass_behind_a_transmission_is_implausible() -> None:
-    assert implausible((3.0,), axis(3.0, 0.5)) == 0.0
-    assert implausible((3.0,), axis(3.0, 0.1)) == pytest.approx(0.0, abs=1e-12)
-    assert implausible((3.0,), axis(3.0, 0.05)) == pytest.approx(0.1)
-    assert implausible((3.0,), axis(6.0, 0.05)) == pytest.approx(0.2)
+    assert strange((3.0,), axis(3.0, 0.5)) == 0.0
+    assert strange((3.0,), axis(3.0, 0.1)) == pytest.approx(0.0, abs=1e-12)
+    assert strange((3.0,), axis(3.0, 0.05)) == pytest.approx(0.1)
+    assert strange((3.0,), axis(6.0, 0.05)) == pytest.approx(0.2)
 
 
 def test_a_term_earns_its_place_by_more_than_chance_a_floor_and_a_part_of_all() -> None:
