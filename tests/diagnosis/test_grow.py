@@ -1,16 +1,20 @@
-"""A model grown with a slow observer is judged by the faster one that was given up for it."""
+"""A model grown with a slow observer is judged by the faster one that was given up for it; moves and terms take turns."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from fric.diagnosis.fitting import State, refit
-from fric.diagnosis.grow import left_beyond
+from fric.diagnosis.grow import left_beyond, with_moves
 from fric.diagnosis.growth import Growth
+from fric.diagnosis.settle import Step
 from fric.diagnosis.track import Track
 from fric.model import Model, build_model, term
 from fric.record import Record
 from fric.simulation import simulate
+
+from .small_axis import NOMINAL as SMALL
+from .small_axis import followed, with_terms
 
 H = 1e-3
 PLAIN = (term("coulomb", force=5.0), term("viscous", coefficient=20.0))
@@ -44,3 +48,20 @@ def test_what_neither_explains_is_left(tracks: list[Track]) -> None:
     given_up = growth(fast, refit(fast, NOMINAL), NOMINAL)
     wrong = growth(slow, refit(slow, NOMINAL), NOMINAL.with_terms((*NOMINAL.terms, term("quadratic_drag", coefficient=1.0))))
     assert left_beyond(given_up, wrong) > 0.5
+
+
+def test_a_move_makes_room_for_what_is_added_then() -> None:
+    """A narrow Stribeck curve told as hysteresis hides a drag; once it has its name, the drag comes."""
+    narrow, drag = (
+        term("stribeck", "exponential", force=6.0, velocity=0.15, exponent=2.0),
+        term("quadratic_drag", coefficient=15.0),
+    )
+    track = followed(narrow, drag, bandwidth=140.0)
+    begin = refit(track, SMALL)
+    end = refit(track, with_terms(term("accel_hysteresis", force=3.0, velocity=0.1)))
+    step = Step("accel_hysteresis", begin.left, end.left, begin.floor, begin.excess, (), ())
+    rest = end.excess / begin.excess
+    found = with_moves(Growth(track, begin, end, (step,), (), rest), lambda _: None)
+    assert {each.term for each in found.steps} == {"stribeck", "quadratic_drag"}
+    assert found.rest < 0.01
+    assert found.end.fit.model.value("quadratic_drag.coefficient") == pytest.approx(15.0, rel=0.02)

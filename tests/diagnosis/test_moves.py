@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 from fric.diagnosis.fitting import State, refit
-from fric.diagnosis.moves import reconsidered
+from fric.diagnosis.moves import alike, reconsidered
 from fric.diagnosis.track import Track
-from fric.model import Term, term
+from fric.effects import by_name
+from fric.model import Term, build_model, term
 
-from .small_axis import NOMINAL, followed, with_terms
+from .small_axis import MASS, NOMINAL, followed, with_terms
 
 DRAG = term("quadratic_drag", coefficient=15.0)
 BENT = term("stribeck", "exponential", force=6.0, velocity=0.15, exponent=1.0)
@@ -68,6 +69,25 @@ def test_an_effect_gives_way_to_the_one_that_it_looks_like(truth: Term) -> None:
     found = reconsidered(track, begin, state, lambda _: None, names_only=True)
     names = {"stribeck" if truth is ROUND else "accel_hysteresis", "quadratic_drag"}
     assert set(found.fit.model.prefixes) - set(NOMINAL.prefixes) == names
+
+
+@pytest.mark.parametrize("holds_both_ways", [("compliance", "impact_backlash"), ("impact_backlash", "compliance")])
+def test_looking_alike_holds_both_ways(holds_both_ways: tuple[str, str]) -> None:
+    one, other = (by_name(each) for each in holds_both_ways)
+    assert alike(one, other)
+    assert not alike(by_name("viscous"), by_name("ripple"))
+
+
+def test_the_simpler_name_wins_where_hardly_anything_is_left() -> None:
+    """Dry friction told as a Stribeck curve that falls far beyond the speeds of the recording."""
+    bare = build_model("rigid", {"mass": MASS}, [term("viscous", coefficient=20.0)])
+    track = followed(bandwidth=140.0)
+    wrong = bare.with_terms((*bare.terms, term("stribeck", force=4.0, velocity=2.0)))
+    begin, state = refit(track, bare), refit(track, wrong)
+    assert state.excess < 1e-3 * begin.excess
+    found = reconsidered(track, begin, state, lambda _: None, names_only=True)
+    assert set(found.fit.model.prefixes) == {"viscous", "coulomb"}
+    assert found.fit.model.value("coulomb.force") == pytest.approx(4.0, rel=0.01)
 
 
 def test_a_fit_that_ended_in_the_wrong_valley_is_begun_from_elsewhere() -> None:

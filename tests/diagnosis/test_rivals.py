@@ -12,7 +12,7 @@ from fric.diagnosis.candidates import candidates, scales_of
 from fric.diagnosis.fitting import refit, with_room
 from fric.diagnosis.other_forms import with_play
 from fric.diagnosis.other_laws import laws_further, strained, told
-from fric.diagnosis.price import FAR_OFF, implausible, mass_off
+from fric.diagnosis.price import FAR_OFF, mass_off, strange
 from fric.diagnosis.result import listed
 from fric.diagnosis.rival import rival_of
 from fric.diagnosis.screen import Promise, screen
@@ -29,11 +29,11 @@ def _axis(mass: float, share: float) -> Model:
 
 def test_hardly_any_mass_behind_a_spring_counts_as_a_mass_that_is_off() -> None:
     """A spring without a body behind it is the first micrometres of a contact."""
-    usual, light = implausible([2.0], _axis(2.0, 0.4)), implausible([2.0], _axis(2.0, 0.05))
+    usual, light = strange([2.0], _axis(2.0, 0.4)), strange([2.0], _axis(2.0, 0.05))
     assert usual == 0.0
-    assert light == pytest.approx(implausible([2.0], _axis(4.0, 0.4)))  # half of the least share, twice the mass
-    assert implausible([2.0], _axis(2.0, 0.1)) == 0.0
-    assert implausible([2.0], build_model("rigid", {"mass": 2.0}, [term("coulomb", force=4.0)])) == 0.0
+    assert light == pytest.approx(strange([2.0], _axis(4.0, 0.4)))  # half of the least share, twice the mass
+    assert strange([2.0], _axis(2.0, 0.1)) == 0.0
+    assert strange([2.0], build_model("rigid", {"mass": 2.0}, [term("coulomb", force=4.0)])) == 0.0
 
 
 @pytest.mark.parametrize("ratio", [0.84, 1.0, 1.19])

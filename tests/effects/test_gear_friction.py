@@ -35,6 +35,14 @@ def test_it_sticks_up_to_the_force_that_beats_dry_friction_and_its_own(force: fl
     assert (moved.position[-1] != 0.0) == moves
 
 
+@pytest.mark.parametrize(("force", "moves"), [(2.99, False), (3.01, True)])
+def test_what_scales_a_guideway_leaves_the_gear_alone(force: float, moves: bool) -> None:
+    # f - 0.25 |f| = 1.5 times 1.5 at 3 N, at a place where the guideway rubs half as much again.
+    place = term("position_dependence", "periodic", cosine=0.5, sine=0.0, period=1.0)
+    moved = simulate(axis(PROPORTIONAL, place), np.full(200, force), H)
+    assert (moved.position[-1] != 0.0) == moves
+
+
 @pytest.mark.parametrize("gear", [PROPORTIONAL, DIRECTIONAL], ids=["both ways", "by direction"])
 def test_the_motion_needs_the_force_that_made_it(gear: fric.Term) -> None:
     model = axis(gear)

@@ -116,7 +116,7 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
         if len(more.steps) == len(moved.steps):
             return moved
         growth = settled_again(more)
-        if not growth.steps or growth.price >= moved.price:
+        if not growth.steps or growth.rest >= moved.rest:
             return moved
 
 

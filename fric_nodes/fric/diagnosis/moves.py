@@ -28,7 +28,7 @@ from .screen import screen
 from .settle import TO_STAY
 from .track import Track
 
-__all__ = ["reconsidered"]
+__all__ = ["alike", "reconsidered"]
 
 _CLEARLY = 3.0  # statistical, nats: odds of twenty to one; a move that gains less isn't made
 _LAWS = 2  # of the best by themselves, that are also tried with each other term taken away
@@ -154,7 +154,7 @@ class _Search:
                 break
             held = model.terms[k].effect
             without = refit(self.track, without_place(model, k))
-            like = [each for each in candidates(without.fit.model, scales) if _alike(each.effect, held)]
+            like = [each for each in candidates(without.fit.model, scales) if alike(each.effect, held)]
             alone = [Candidate(each.effect, (trial,)) for each in like for trial in each.trials]
             for effect_id in dict.fromkeys(each.effect.id for each in like):
                 of_it = [each for each in alone if each.effect.id == effect_id]
@@ -165,7 +165,7 @@ class _Search:
         return made
 
 
-def _alike(one: Effect, other: Effect) -> bool:
+def alike(one: Effect, other: Effect) -> bool:
     """Whether either effect is named among those that look like the other: that holds both ways."""
     return one.id in other.looks_like or other.id in one.looks_like
 
