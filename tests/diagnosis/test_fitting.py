@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fric.diagnosis.at_once import helped
-from fric.diagnosis.fitting import free_names, refit, unseen, without_term
+from fric.diagnosis.fitting import free_names, left_beside, refit, unseen, without_term
 from fric.diagnosis.growth import Growth
 from fric.diagnosis.track import Track
 from fric.model import Model, build_model, term
@@ -76,3 +76,16 @@ def test_what_hung_on_a_body_is_part_of_it_again_without_the_spring() -> None:
     left = without_term(driven, "compliance")
     assert left.value("mass") * (1.0 - left.value("load_share")) == pytest.approx(2.5 * 0.8)
     assert left.value("mass") * left.value("load_share") == pytest.approx(2.5 * 0.2 + 1.5)
+
+
+def test_what_is_led_otherwise_counts_alike() -> None:
+    """Without dry friction a model lacks it: pushed, it shows all of that, and less where its position is set."""
+    smooth = build_model("rigid", {"mass": 60.0}, [term("viscous", coefficient=120.0)])
+    bristles = term("presliding", "lugre", stiffness=1e8, damping=1e4)
+    track = Track.of([recording(TRUTH, 1)], 140.0, smooth)
+    pushed, put = refit(track, smooth), refit(track, smooth.with_terms((*smooth.terms, bristles)))
+    assert left_beside(track, pushed, False) == pushed.left
+    assert left_beside(track, put, True) == put.left
+    # Bristles without a level carry no force: both are the same model, led in two ways.
+    assert pushed.left > 1.05 * put.left
+    assert left_beside(track, pushed, True) == pytest.approx(put.left, rel=0.05)

@@ -99,3 +99,18 @@ def test_a_fit_that_ended_in_the_wrong_valley_is_begun_from_elsewhere() -> None:
     found, _ = moves(track, begin, stuck)
     assert found.fit.model.value("position_dependence.width") == pytest.approx(0.01, rel=0.1)
     assert found.left < 0.05 * stuck.left
+
+
+def test_bristles_that_do_nothing_go_although_a_model_with_them_is_led_otherwise() -> None:
+    """Its position is set, so that it seems to lack less than the same model without them."""
+    rigid = term("presliding", "lugre", stiffness=1e9, damping=1e5)
+    track, begin, state = begun(DRAG, grown=(DRAG, rigid))
+    found, _ = moves(track, begin, state)
+    assert found.fit.model.prefixes == (*NOMINAL.prefixes, "quadratic_drag")
+
+
+def test_bristles_that_are_there_stay() -> None:
+    bristles = term("presliding", "lugre", stiffness=2e4, damping=100.0)
+    track, begin, state = begun(bristles, DRAG, grown=(DRAG, bristles))
+    found, _ = moves(track, begin, state)
+    assert {"presliding", "quadratic_drag"} <= set(found.fit.model.prefixes)

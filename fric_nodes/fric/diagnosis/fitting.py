@@ -31,6 +31,7 @@ __all__ = [
     "bounds_of",
     "free_names",
     "is_driven",
+    "left_beside",
     "left_by",
     "refit",
     "shaken",
@@ -113,6 +114,14 @@ def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
 def left_by(track: Track, fit: Fit) -> float:
     """What a fitted model leaves on unseen blocks [F^2], the more where it minds the effort less (:mod:`.indifference`)."""
     return unseen(track, fit, fit.residual) * dearer(track, fit.model)
+
+
+def left_beside(track: Track, state: State, with_slip: bool) -> float:
+    """What ``state`` leaves on unseen blocks [F^2], as it counts beside a model with slip dynamics, or else without.
+
+    A model with slip dynamics has its position set, and seems to lack less for that: so has the other one then.
+    """
+    return state.left / (track.unpaid(state.fit.model) if with_slip else 1.0)
 
 
 def unseen(track: Track, fit: Fit, residual: Array, apart: str = "") -> float:

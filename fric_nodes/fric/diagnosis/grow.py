@@ -131,7 +131,8 @@ def _moved(growth: Growth, tell: Callable[[str], None]) -> Growth:
         tell("comparing its effects with those that look like them" if little else "reconsidering its laws and values")
     state = reconsidered(growth.track, growth.begin, growth.end, tell, names_only=little)
     if state is growth.end:
-        return growth
+        compares = any(not step.rivals for step in growth.steps)  # of terms that have come together none has been compared
+        return replace(growth, steps=compared(growth.track, growth.begin, state, growth.steps)) if compares else growth
     more = reproduced(replace(growth, end=state, steps=_steps_of(growth, state), rest=_rest_of(growth, state)))
     # The moves have paid for their parameters in nats; halves of the recordings must not speak against what came of them.
     if not more.steps or more.rest > growth.rest + max(growth.dear - more.dear, 0.0):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..effect import Effect
 from ..model import Model, Term
@@ -20,7 +20,7 @@ from .along import Along
 from .candidates import Candidate, candidates, scales_of
 from .costs import NATS_PER_PARAMETER
 from .deadline import is_over
-from .fitting import NOTHING, State, begun, bounds_of, free_names, refit, without_place
+from .fitting import NOTHING, State, begun, bounds_of, free_names, left_beside, refit, without_place
 from .motor_side import all_on_load, half_on_motor
 from .other_laws import laws_in_place, told
 from .price import implausible
@@ -44,10 +44,16 @@ class _Search:
     state: State
     own: frozenset[str]
     tell: Callable[[str], None]
+    scores: dict[tuple[State, bool], float] = field(default_factory=dict)
 
-    def score(self, state: State) -> float:
-        """Log likelihood of unseen blocks, less the price of the structure [nats]."""
-        left, model = state.left, state.fit.model
+    def score(self, state: State, with_slip: bool) -> float:
+        """Log likelihood of unseen blocks, less the price of the structure [nats], as it counts beside slip dynamics or not."""
+        if (state, with_slip) not in self.scores:
+            self.scores[state, with_slip] = self._score(state, with_slip)
+        return self.scores[state, with_slip]
+
+    def _score(self, state: State, with_slip: bool) -> float:
+        left, model = left_beside(self.track, state, with_slip), state.fit.model
         if not math.isfinite(left) or left <= 0.0:
             return -math.inf
         price = NATS_PER_PARAMETER * sum(name != "load_share" for name in free_names(model))
@@ -65,13 +71,18 @@ class _Search:
         What doesn't make the structure smaller must take off a real part of what was missing, too, unless it is to explain the
         ``same``.
         """
-        best = max(made, key=lambda each: self.score(each[1]), default=None)
-        if best is None or self.score(best[1]) <= self.score(self.state) + _CLEARLY:
+        moves = list(made)
+        slips = any(each.fit.model.has_slip_dynamics for each in (self.state, *(state for _, state in moves)))
+        best = max(moves, key=lambda each: self.score(each[1], slips), default=None)
+        if best is None:
+            return False
+        better = self.score(best[1], slips) - self.score(self.state, slips)
+        if not better > _CLEARLY:
             return False
         smaller = len(best[1].fit.model.terms) < len(self.state.fit.model.terms)
         if not (smaller or same) and self.state.left - best[1].left < TO_STAY * self.begin.excess:
             return False
-        self.tell(f"{best[0]}: better by {self.score(best[1]) - self.score(self.state):.0f} nats")
+        self.tell(f"{best[0]}: better by {better:.0f} nats")
         self.state = best[1]
         return True
 
@@ -126,7 +137,8 @@ class _Search:
                 state = refit(self.track, model.with_terms(terms))
                 if told(state.fit.model.terms[k], scales):
                     made.append((f"{law.effect.title} by another law ({law.effect.law})", k, state))
-        made.sort(key=lambda each: -self.score(each[2]))
+        slips = any(state.fit.model.has_slip_dynamics for *_, state in made)
+        made.sort(key=lambda each: -self.score(each[2], slips))
         fewer = [(f"{what}, {which}", state) for what, k, whole in made[:_LAWS] for which, state in self.without_each(whole, k)]
         return [*((what, state) for what, _, state in made), *fewer]
 

@@ -39,6 +39,7 @@ FRESH_SURPLUS = Parameter(
 REGIME = "the first moment of motion after a rest: the longer the rest, the higher the peak; and low speed"
 
 LOOKS_LIKE = {
+    "coulomb": "break away after rests of graded length: what has risen with the dwell time is less after short ones",
     "stribeck": "repeat reversals with rests of graded length: only with dwell time does break-away depend on the rest",
     "frictional_lag": "repeat break-away after rests of graded length: with a lag it stops rising after a few time constants",
     "temperature": "alternate short and long rests in random order: a temperature changes slowly and not with the last rest",

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...model import Model
 from ..deadline import is_over
-from ..fitting import NOTHING, State, added, refit, unseen, without_place
+from ..fitting import NOTHING, State, added, left_beside, refit, unseen, without_place
 from ..growth import LITTLE
 from ..settle import CLEARLY
 from ..track import Track
@@ -71,7 +71,7 @@ def grown_together(
         partial = beside_unknown or whole.excess > max(LITTLE * begin.excess, CLEARLY * whole.floor)
         weighed = _beside_functions(track) if partial else _by_unseen_blocks(track, independent)
         grown = _pruned(track, whole, begin, weighed, tell)
-        if _nats(state, grown, independent) < (0.0 if partial else _GAIN) or _same(state, grown):
+        if _nats(state.left, grown.left, independent) < (0.0 if partial else _GAIN) or _same(state, grown):
             break
         tell(f"leaves {100.0 * grown.excess / max(begin.excess, 1e-300):.0f} % of what was missing")
         state = grown
@@ -148,7 +148,8 @@ def _by_unseen_blocks(track: Track, independent: float) -> Weighed:
     def of(state: State) -> Callable[[int], tuple[float, Model]]:
         def weigh(place: int) -> tuple[float, Model]:
             without = refit(track, without_place(state.fit.model, place), _TO_WEIGH)
-            return _nats(without, state, independent), without.fit.model
+            left = left_beside(track, without, state.fit.model.has_slip_dynamics)
+            return _nats(left, state.left, independent), without.fit.model
 
         return weigh
 
@@ -171,8 +172,8 @@ def _left_without(track: Track, state: State, place: int) -> float:
     return unseen(track, state.fit, residual, f"{state.fit.model.prefixes[place]}.")
 
 
-def _nats(before: State, after: State, independent: float) -> float:
-    """Logarithm of the likelihood ratio on unseen blocks, of residuals whose variance each model has of its own."""
-    if not np.isfinite(after.left) or after.left <= 0.0:
+def _nats(before: float, after: float, independent: float) -> float:
+    """Logarithm of the likelihood ratio on unseen blocks, of what two models leave there [F^2], each with its own variance."""
+    if not np.isfinite(after) or after <= 0.0:
         return -math.inf
-    return 0.5 * independent * math.log(max(before.left, 1e-300) / after.left)
+    return 0.5 * independent * math.log(max(before, 1e-300) / after)
