@@ -199,10 +199,7 @@ def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str],
             continue
         if is_over():
             break
-        much = not names_only and search.state.excess >= NOTHING * search.state.floor
-        if much and (
-            search.taken(search.other_side()) or search.taken(search.elsewhere()) or search.taken(search.other_laws())
-        ):
+        if not names_only and search.state.excess >= NOTHING * search.state.floor and search.mended():
             continue
         if not search.renamed():
             break
