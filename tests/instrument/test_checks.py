@@ -92,6 +92,15 @@ def test_units_against_a_model(clean: Record, nominal: Model, signal: str, facto
     assert found("units", finding.correction.apply(wrong), model=nominal).verdict == "ok"
 
 
+def test_a_command_far_beyond_the_limit_of_the_drive_is_no_unit(clean: Record, nominal: Model) -> None:
+    """The force stays what the drive can give, whatever is asked for: no factor explains what is recorded."""
+    asked = 40.0 * (1.0 + 0.9 * np.sin(2.0 * np.pi * 0.37 * clean.time) * np.sin(2.0 * np.pi * 1.1 * clean.time))
+    finding = found("units", replace(clean, reference=None, velocity=None, effort=asked * clean.effort), model=nominal)
+    assert finding.verdict == "warning"
+    assert finding.value > 10.0
+    assert "no single factor" in finding.detail
+
+
 def test_a_known_gear_ratio_is_named(clean: Record, nominal: Model) -> None:
     wrong = replace(clean, reference=None, velocity=None, position=37.0 * clean.position)
     finding = CHECKS["units"].run(Evidence([wrong], nominal, {"gear_ratio": 37.0}))[0]

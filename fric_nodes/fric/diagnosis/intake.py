@@ -72,7 +72,8 @@ def without_faults(
     """The recordings without the faults of sign, unit and clock that can be taken out of them.
 
     What all recordings learnt from have is taken out of those held back alike, unless these are seen not to have it; what these
-    alone have is taken out of them. A delay is left in: it may belong to the axis, and is a candidate like others.
+    alone have is taken out of them, unless those learnt from give a warning of the same: then the axis is unlike its model. A
+    delay is left in: it may belong to the axis, and is a candidate like others.
     """
     held, kept_apart, notes = list(train), list(validation), []
     wrong = [(check, correction) for check in checks if (correction := _correction_of(check)) is not None]
@@ -86,6 +87,7 @@ def without_faults(
             continue  # where an encoder's lines lie is known only to the recording that shows them
         if check.recording is None or sum(each.check == check.check for each, _ in wrong) == len(held):
             of_all.setdefault(check.check, correction)
+    unlike = {check.check for check in checks if check.verdict == "warning" and check.correction is None}
     own_checks = [[each for each in checks if each.recording in (k, None)] for k in range(len(train))]
     for k, record in enumerate(validation):
         seen = inspect([record], nominal)
@@ -98,7 +100,7 @@ def without_faults(
                 kept_apart[k] = correction.apply(kept_apart[k])
         for check in seen:
             own = _correction_of(check)
-            if own is not None and check.check not in of_all:
+            if own is not None and check.check not in of_all and check.check not in unlike:
                 kept_apart[k] = own.apply(kept_apart[k])
                 notes.append(f"corrected in {record.source} alone: {own.text} ({check.detail})")
     both, known = _without_known_lines([*held, *kept_apart], own_checks)

@@ -1,11 +1,13 @@
 """Wrong unit or gear ratio: mass and friction that only fit the model when position or effort is off by a factor.
 
 With the position recorded s times too large, the mass seems s times too small, and the model's friction is to be taken at the
-true speed v/s; with the effort g times too large all forces are. The factor is estimated, and not picked from a list: log g
-is the mean of the estimates from mass and friction, each weighted by its variance (its standard error, and how well a model's
+true speed v/s; with the effort g times too large all forces are. The factor is estimated, and not picked from a list: log g is
+the mean of the estimates from mass and friction, each weighted by its variance (its standard error, and how well a model's
 value is known), with a 95 % interval. A known factor is named only where it lies inside that interval. Mass and friction have
-to agree; without a mass that shows, friction alone must be far off. Without a model, a reference tells the unit of the position
-relative to its own: the factor lies between the two regressions, of either signal on the other.
+to agree, and the force that the balance leaves unexplained must not be able to make the difference: a limit of the drive, or
+friction that follows the force, makes both seem larger, too. Without a mass that shows, friction alone must be far off. Without
+a model, a reference tells the unit of the position relative to its own: the factor lies between the two regressions, of either
+signal on the other.
 """
 
 from __future__ import annotations
@@ -102,9 +104,11 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         if seen:
             candidates.append(("position", _position(by_mass[0], friction, speed, evidence)))
         signal, factor = min(candidates, key=lambda each: each[1].apart)
-        if factor.apart < min(_AGREE, 0.5 * plain):
+        # What is unexplained may be friction that the balance doesn't have: the factor is known no better than that.
+        unexplained = math.log1p(view.balance.residual / friction)
+        if max(factor.apart, unexplained) < min(_AGREE, 0.5 * plain):
             return _of(signal, factor, evidence, "the model", view)
-    detail = f"mass or friction differs from the model by a factor of {math.exp(plain):.3g}, and no single factor explains both"
+    detail = f"mass or friction differs from the model by a factor of {math.exp(plain):.3g}, and no single factor explains it"
     return Finding(
         "units", "warning", detail, math.exp(plain), "1", remedy="check the model's values, the units and the gear ratio"
     )
