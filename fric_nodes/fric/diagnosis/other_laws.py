@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -58,7 +59,7 @@ def laws_beside(held: Term, scales: Scales) -> Iterator[Term]:
 
 
 def laws_in_place(track: Track, fit: Fit, place: int) -> list[Term]:
-    """What may stand in the place of a term: :func:`laws_beside`, and forms of its law with values that the law doesn't have.
+    """What may stand in the place of a term: :func:`laws_beside`, :func:`laws_further`, and forms with values the law lacks.
 
     Args:
         track: the recordings.
@@ -67,11 +68,37 @@ def laws_in_place(track: Track, fit: Fit, place: int) -> list[Term]:
     """
     held, scales = fit.model.terms[place], scales_of(track)
     found = list(laws_beside(held, scales))
+    for term in laws_further(held, scales):
+        if term.effect not in [each.effect for each in found]:
+            found.append(_least_bent(track, fit, place, term))
     for law in EFFECTS.values():
         if law.id == held.effect.id and law.form_of == held.effect.law and law.form_of:
             term = _begun(track, fit, place, list(_suggested(law, held, scales)))
             found += [] if term is None else [term]
     return found
+
+
+def _least_bent(track: Track, fit: Fit, place: int, term: Term) -> Term:
+    """``term``, or the same with less of what bends it, by powers of ten, whichever leaves least before it is fitted.
+
+    A fit that begins with a spring that is bent too much ends with another spring.
+    """
+    held = fit.model.terms[place].by_name
+    terms = [
+        replace(
+            term,
+            values=tuple(
+                v if p.name in held else v * 0.1**power for p, v in zip(term.effect.parameters, term.values, strict=True)
+            ),
+        )
+        for power in range(4)
+    ]
+
+    def left(tried: Term) -> float:
+        model = fit.model.with_terms(tried if k == place else each for k, each in enumerate(fit.model.terms))
+        return float(np.linalg.norm(track.residual(model)))
+
+    return terms[int(np.argmin(mapped(left, terms)))]
 
 
 def _suggested(law: Effect, held: Term, scales: Scales) -> Iterator[Term]:

@@ -17,7 +17,7 @@ from ..record import Array, Index, Mask, Record
 from ..signals.instrument_noise import level_of
 from ..signals.resolution import step_of
 
-__all__ = ["Balance", "View", "friction_along", "imbalance", "runs"]
+__all__ = ["Balance", "View", "balance_on", "friction_along", "imbalance", "runs"]
 
 _ORDER = 4
 _WIDEST = 100.0  # [Hz]

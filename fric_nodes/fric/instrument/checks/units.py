@@ -5,9 +5,10 @@ true speed v/s; with the effort g times too large all forces are. The factor is 
 the mean of the estimates from mass and friction, each weighted by its variance (its standard error, and how well a model's
 value is known), with a 95 % interval. A known factor is named only where it lies inside that interval. Mass and friction have
 to agree, and the force that the balance leaves unexplained must not be able to make the difference: a limit of the drive, or
-friction that follows the force, makes both seem larger, too. Without a mass that shows, friction alone must be far off. Without
-a model, a reference tells the unit of the position relative to its own: the factor lies between the two regressions, of either
-signal on the other.
+friction that follows the force, makes both seem larger, too. A unit is the same while the effort drives the axis and while it
+brakes it; friction that follows the force isn't. Without a mass that shows, friction alone must be far off. Without a model, a
+reference tells the unit of the position relative to its own: the factor lies between the two regressions, of either signal on
+the other.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..check import Check, Correction, Evidence, Finding, each
-from ..view import View, friction_along
+from ..view import View, balance_on, friction_along
 from .position_sign import agreement, turned
 
 __all__ = ["CHECK", "named"]
@@ -106,12 +107,28 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         signal, factor = min(candidates, key=lambda each: each[1].apart)
         # What is unexplained may be friction that the balance doesn't have: the factor is known no better than that.
         unexplained = math.log1p(view.balance.residual / friction)
-        if max(factor.apart, unexplained) < min(_AGREE, 0.5 * plain):
+        if max(factor.apart, unexplained, abs(_braking(view))) < min(_AGREE, 0.5 * plain):
             return _of(signal, factor, evidence, "the model", view)
     detail = f"mass or friction differs from the model by a factor of {math.exp(plain):.3g}, and no single factor explains it"
+    if _braking(view) > _AGREE:
+        detail += (
+            f": driving takes {math.exp(_braking(view)):.2g} times the mass that braking takes, as with friction of a gear"
+        )
     return Finding(
         "units", "warning", detail, math.exp(plain), "1", remedy="check the model's values, the units and the gear ratio"
     )
+
+
+def _braking(view: View) -> float:
+    """Logarithm of the mass while the effort drives the axis over that while it brakes it; 0 where braking shows no mass.
+
+    A wrong unit is the same both ways.
+    """
+    power = view.effort * view.velocity
+    driving, braking = (balance_on(view, np.flatnonzero(view.sliding & each)) for each in (power > 0.0, power < 0.0))
+    if not (driving.shows("mass") and braking.shows("mass")):
+        return 0.0
+    return math.log(driving.value("mass") / braking.value("mass"))
 
 
 def _position(by_mass: tuple[float, float], friction: float, speed: float, evidence: Evidence) -> _Factor:
