@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import pytest
 from fric.diagnosis.candidates import Scales
-from fric.diagnosis.other_laws import laws_beside, laws_further, strained, told
+from fric.diagnosis.fitting import refit
+from fric.diagnosis.other_laws import laws_beside, laws_further, laws_in_place, strained, told
 from fric.diagnosis.worth_trying import worth_trying
 from fric.effects import EFFECTS
 from fric.model import Term, term
+
+from .small_axis import followed, with_terms
 
 SCALES = Scales(
     level=10.0, range=40.0, most=20.0, speed=0.5, slow=1e-3, low=0.0, high=0.2, duration=4.0, step=2e-3, mass=2.0,
@@ -47,6 +50,20 @@ def test_sliding_elements_come_after_the_level_within_some_samples() -> None:
     for each in beside(term("presliding", "lugre", stiffness=1e5, damping=300.0))["gms"]:
         assert each.by_name["attraction"] == pytest.approx(10.0 / (5.0 * 2e-3))
         assert each.by_name["stiffness"] == 1e5
+
+
+def test_a_spring_that_hardens_comes_in_the_place_of_a_linear_one_that_was_found() -> None:
+    track = followed(term("compliance", "hardening", stiffness=2e4, hardening=5e10, damping=10.0))
+    linear = refit(track, with_terms(term("compliance", stiffness=2.5e4, damping=10.0)))
+    place = [held.effect.id for held in linear.fit.model.terms].index("compliance")
+    (law,) = [each for each in laws_in_place(track, linear.fit, place) if each.effect.law == "hardening"]
+    bent = refit(
+        track, linear.fit.model.with_terms(law if k == place else held for k, held in enumerate(linear.fit.model.terms))
+    )
+    assert bent.left < 0.5 * linear.left
+    found = bent.fit.model.terms[place].by_name
+    assert found["stiffness"] == pytest.approx(2e4, rel=0.1)
+    assert found["hardening"] == pytest.approx(5e10, rel=0.2)
 
 
 @pytest.mark.parametrize("usual", worth_trying(), ids=lambda each: each.key)

@@ -28,7 +28,7 @@ from .contradiction import contradiction_of, without_stand_ins
 from .deadline import is_over, within
 from .excerpt import confirmed, excerpt
 from .findings import contradicted
-from .fitting import best_track
+from .fitting import NOTHING, best_track
 from .grow import first_terms, grow, leaves_much, with_moves
 from .growth import Growth
 from .intake import of_use, refuse, without_faults
@@ -37,6 +37,7 @@ from .ladder import ladder_of
 from .price import FAR_OFF, strange
 from .reproduced import reproduced
 from .result import Diagnosis
+from .settle import audit
 from .start import (
     DiagnosisError,
     held_as,
@@ -118,8 +119,13 @@ def _diagnosed(train: Sequence[Record], validation: Sequence[Record], nominal: M
         corrected.append("the search was ended after the time that was asked for: further effects may be missing")
     if parts is not None:
         tell("fitting what was found to all samples")
+        sufficed = growth.end.excess < NOTHING * growth.end.floor and growth.unhelped is None
         growth, note = confirmed(parts, growth)
         corrected.append(note)
+        if sufficed and growth.end.excess >= NOTHING * growth.end.floor:
+            # All samples show what the excerpt holds too little of.
+            rest = audit(growth.track, growth.begin.fit.model, growth.end.fit.model)
+            growth = with_moves(replace(growth, rest=rest), tell)
     contradiction = contradiction_of(growth, train)
     tell("judging on the validation recordings")
     if contradiction is not None:
