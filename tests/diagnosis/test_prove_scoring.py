@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from fric.diagnosis.prove.reliability import calibration_bins, error_by_chance
 from fric.diagnosis.prove.scoring import (
     Found,
     Outcome,
     Rate,
-    calibration_bins,
     components_of,
     energy_held,
     scored,
@@ -102,6 +102,14 @@ def test_calibration_error_counted_by_hand() -> None:
     outcomes = [_outcome("moderate", ("ripple",), (_found("ripple" if right else "bias", c),)) for c, right in pairs]
     figure = next(each for each in scored(outcomes).figures if "calibration" in each.name)
     assert figure.value == pytest.approx((10 * 0.05 + 4 * 0.15) / 14)
+
+
+def test_a_few_findings_that_are_right_as_often_as_they_say_have_a_calibration_error() -> None:
+    """Of n findings of a confidence c it is the mean deviation of a binomial's share, sqrt(2 c (1 - c) / (pi n))."""
+    for confidence, n in ((0.5, 100), (0.9, 50)):
+        expected = math.sqrt(2.0 * confidence * (1.0 - confidence) / (math.pi * n))
+        assert error_by_chance([confidence] * n) == pytest.approx(expected, rel=0.1)
+    assert error_by_chance([0.95] * 20) > error_by_chance([0.95] * 2000)
 
 
 def test_a_score_counts_confusion_rates_and_goals() -> None:

@@ -49,6 +49,17 @@ def test_without_columns_all_is_left() -> None:
     assert Gram(everything, BLOCKS).left(1, []) == pytest.approx(float(everything[:, 1] @ everything[:, 1]))
 
 
+@pytest.mark.parametrize("held", [0.0, 300.0, 1e300])
+@pytest.mark.parametrize("size", [0.0, 1e-170])
+def test_a_column_that_is_nothing_takes_nothing(held: float, size: float) -> None:
+    """As where a limit is never reached: the fit is that of the other columns."""
+    everything = columns(4)
+    everything[:, 3] *= size
+    gram = Gram(everything, BLOCKS, np.array([0.0, 0.0, 0.0, held]))
+    assert gram.left(0, [1, 3]) == pytest.approx(gram.left(0, [1]), rel=1e-6)
+    assert gram.solved(0, [1, 3])[0] == pytest.approx(gram.solved(0, [1])[0], rel=1e-6)
+
+
 def test_many_sets_at_once_come_to_the_same_as_one_after_the_other() -> None:
     everything = columns(8)
     gram = Gram(everything, BLOCKS)

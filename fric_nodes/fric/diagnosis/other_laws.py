@@ -68,9 +68,9 @@ def laws_in_place(track: Track, fit: Fit, place: int) -> list[Term]:
     """
     held, scales = fit.model.terms[place], scales_of(track)
     found = list(laws_beside(held, scales))
-    for term in laws_further(held, scales):
-        if term.effect not in [each.effect for each in found]:
-            found.append(_least_bent(track, fit, place, term))
+    for further in laws_further(held, scales):
+        if further.effect not in [each.effect for each in found]:
+            found.append(_least_bent(track, fit, place, further))
     for law in EFFECTS.values():
         if law.id == held.effect.id and law.form_of == held.effect.law and law.form_of:
             term = _begun(track, fit, place, list(_suggested(law, held, scales)))

@@ -124,7 +124,7 @@ class Gram:
         found = np.empty(used.shape[0])
         for first in range(0, used.shape[0], _AT_ONCE):
             index = used[first : first + _AT_ONCE]
-            scale = np.sqrt(np.maximum(np.diag(self.total)[index], 1e-300))
+            scale = np.sqrt(np.maximum((np.diag(self.total) + self._held)[index], 1e-300))
             # Sets, blocks, rows, columns.
             within = np.moveaxis(self.of_block[:, index[:, :, None], index[:, None, :]], 0, 1)
             with_target = np.moveaxis(self.of_block[:, index, target], 0, 1)
@@ -140,7 +140,7 @@ class Gram:
     def solved(self, target: int, used: Sequence[int]) -> Array:
         """Coefficients of the columns ``used`` that leave the least of ``target`` over all blocks."""
         index = np.array(used, dtype=np.int64)
-        scale = np.sqrt(np.maximum(np.diag(self.total)[index], 1e-300))
+        scale = np.sqrt(np.maximum((np.diag(self.total) + self._held)[index], 1e-300))
         normal = self.total[np.ix_(index, index)] / np.outer(scale, scale) + np.diag(_TINY + self._held[index] / scale**2)
         return np.asarray(-np.linalg.solve(normal, self.total[index, target] / scale) / scale)
 

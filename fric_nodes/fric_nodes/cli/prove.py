@@ -158,7 +158,7 @@ def _examine(cases: int, seed: int, variant: str, effort: Effort, out: Path, as_
 
 def _calibrate(examinations: list[Path], out: Path) -> None:
     """The map from evidence to probability; ``calibration.json`` goes into ``out``."""
-    from fric.diagnosis.prove.calibrating import learnt
+    from fric.diagnosis.prove.calibrating import learnt, off_in_use
     from fric.files import write_text
 
     content = learnt(examinations)
@@ -166,6 +166,10 @@ def _calibrate(examinations: list[Path], out: Path) -> None:
     write_text(out / "calibration.json", json.dumps(content, indent=1) + "\n")
     typer.echo(f"{content['findings']} findings, {content['right']} of them right")
     typer.echo(f"calibration error on cases that the map was not learnt from: {content['off on other cases']}")
+    error, chance = off_in_use(examinations)
+    typer.echo(
+        f"of the map in use, if it was learnt from none of these: {error:.3f}; by chance alone, were it exact: {chance:.3f}"
+    )
     typer.echo(f"written: {out / 'calibration.json'}")
 
 

@@ -19,12 +19,12 @@ from scipy.optimize import minimize
 
 from ...errors import InputError
 from ...record import Array
-from ..calibration import FORMAT, Calibration, Evidence, measures_of
+from ..calibration import FORMAT, Calibration, Evidence, calibration, measures_of
 from .injection_exam import told_in
-from .scoring import calibration_bins
+from .reliability import calibration_error, error_by_chance
 from .sealing import case_folder, open_key, published
 
-__all__ = ["Trial", "fitted", "learnt", "off_on_others", "trials_of"]
+__all__ = ["Trial", "fitted", "learnt", "off_in_use", "off_on_others", "trials_of"]
 
 _WEIGHT = 2.0  # statistical: standard deviation of a weight before anything is known
 _EFFECT = 1.0  # statistical: of what is added for an effect: odds of three to one are nothing special
@@ -94,7 +94,19 @@ def off_on_others(trials: Sequence[Trial]) -> float:
         content = fitted([trial for trial in trials if trial.case != case])
         found = Calibration(content["offset"], content["weights"], content["effects"])
         pairs += [(found.probability(t.effect, t.evidence), t.right) for t in trials if t.case == case]
-    return sum(n * abs(said - right) for said, right, n in calibration_bins(pairs)) / len(pairs)
+    return calibration_error(pairs)
+
+
+def off_in_use(outs: Sequence[Path]) -> tuple[float, float]:
+    """Calibration error of the map in use on the findings of all examinations together, and what chance alone would make.
+
+    It means something where the map was learnt from none of them.
+
+    Raises:
+        InputError: no examination.
+    """
+    pairs = [(calibration().probability(t.effect, t.evidence), t.right) for out in outs for t in trials_of(out)]
+    return calibration_error(pairs), error_by_chance([said for said, _ in pairs])
 
 
 def _provenance(out: Path) -> dict[str, Any]:

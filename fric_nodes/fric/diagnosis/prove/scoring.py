@@ -32,11 +32,11 @@ from ...effect import Place
 from ...effects import EFFECTS
 from ...figure import Figure
 from ...record import Array
+from .reliability import calibration_bins, calibration_error, error_by_chance
 
-__all__ = ["Found", "Outcome", "Rate", "Score", "calibration_bins", "components_of", "energy_held", "outcome_of", "scored"]
+__all__ = ["Found", "Outcome", "Rate", "Score", "components_of", "energy_held", "outcome_of", "scored"]
 
 _GRID = 0.05  # [s]
-_BINS = 10
 _SLACK = 0.05  # by which the goals of shares are wider in variants of the examination
 
 _COMPONENTS = {
@@ -253,17 +253,6 @@ def _merged(spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     return found
 
 
-def calibration_bins(pairs: Sequence[tuple[float, bool]]) -> tuple[tuple[float, float, int], ...]:
-    """Of findings as ``(confidence, right)``: mean confidence, share right and number in each of ten bins that isn't empty."""
-    bins = []
-    for k in range(_BINS):
-        inside = [each for each in pairs if min(int(each[0] * _BINS), _BINS - 1) == k]
-        if inside:
-            n = len(inside)
-            bins.append((sum(c for c, _ in inside) / n, sum(right for _, right in inside) / n, n))
-    return tuple(bins)
-
-
 def _widened(goal: str, slack: float) -> str:
     """``goal``, if there is one, easier by ``slack``."""
     relation, _, limit = goal.partition(" ")
@@ -310,10 +299,11 @@ def scored(outcomes: Sequence[Outcome], variant: str = "standard") -> Score:
     figures += _noe_figures(outcomes, by_kind, "" if variant == "slow-log" else "<= 1.1")
     stated = [(f.confidence, f.effect in o.effects) for o in outcomes for f in o.findings if f.confidence >= 0]
     bins = calibration_bins(stated)
-    count = sum(n for *_, n in bins)
-    if count:
-        error = sum(n * abs(confidence - right) for confidence, right, n in bins) / count
+    if stated:
+        error = calibration_error(stated)
         figures.append(Figure("expected calibration error of the confidence", error, "1", _widened("<= 0.05", slack)))
+        chance = error_by_chance([confidence for confidence, _ in stated])
+        figures.append(Figure("the same by chance alone, were every confidence exact", chance, "1"))
     figures.append(Figure("diagnoses that failed", float(sum(bool(o.failure) for o in outcomes)), "", "<= 0"))
     figures.append(Figure("time of a diagnosis, median", median(o.seconds for o in outcomes), "s"))
     figures.append(Figure("time of a diagnosis, longest", max(o.seconds for o in outcomes), "s"))
