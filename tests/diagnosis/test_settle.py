@@ -98,6 +98,7 @@ def test_a_term_gives_way_to_a_rival_that_explains_more() -> None:
     drag = next(step for step in after.steps if step.term == "quadratic_drag")
     assert drag.before > drag.after  # what is left without it and with it
     assert all(rival.effect.id != "quadratic_drag" for rival in drag.rivals)
+    assert "shear_thinning" in [rival.effect.id for rival in drag.rivals], "what gave way is held against it"
 
 
 def test_what_leaves_much_is_not_exchanged() -> None:

@@ -63,7 +63,11 @@ class _Search:
     @property
     def brought(self) -> list[int]:
         """Places of the terms that may go again."""
-        return [k for k, held in enumerate(self.state.fit.model.terms) if held.effect.key not in self.own]
+        return self._brought_to(self.state.fit.model)
+
+    def _brought_to(self, model: Model) -> list[int]:
+        """Places of the terms of ``model`` that are not the nominal model's."""
+        return [k for k, held in enumerate(model.terms) if held.effect.key not in self.own]
 
     def taken(self, made: Iterable[tuple[str, State]], same: bool = False) -> bool:
         """Whether the best of the moves is clearly better, and then is where the search goes on.
@@ -173,8 +177,23 @@ class _Search:
                 tried = screen(self.track, without.fit, of_it, without.chance, in_pairs=False).tried
                 starts = [begun(self.track, without.fit, [each], scales, along).model for each in tried[:_LAWS]]
                 states = [refit(self.track, start) for start in starts]
+                if states:
+                    states += self._by_other_laws(min(states, key=lambda each: each.left), effect_id)
                 made += [(f"{effect_id} in the place of {held.id}", state) for state in states]
         return made
+
+    def _by_other_laws(self, state: State, effect_id: str) -> list[State]:
+        """``state`` with each other law of the effect ``effect_id`` that came: it mustn't lose by the form of its usual law."""
+        model, scales = state.fit.model, scales_of(self.track)
+        found = []
+        for k in (k for k in self._brought_to(model) if model.terms[k].effect.id == effect_id):
+            for law in laws_in_place(self.track, state.fit, k):
+                tried = refit(
+                    self.track, model.with_terms(law if k == place else held for place, held in enumerate(model.terms))
+                )
+                if told(tried.fit.model.terms[k], scales):
+                    found.append(tried)
+        return found
 
 
 def alike(one: Effect, other: Effect) -> bool:

@@ -269,14 +269,17 @@ def _exchanged(
         effect_id = model.terms[place].effect.id
         without = refit(track, without_place(model, place), max_iterations=8)
         found = screen(track, without.fit, candidates(without.fit.model, scales), without.chance, in_pairs=False)
-        rivals = [rival for rival in rivals_of(track, without, found, scales, state.left) if rival.effect.id != effect_id]
+        fitted = rivals_of(track, without, found, scales, state.left)
+        rivals = [rival for rival in fitted if rival.effect.id != effect_id]
         own = state.left + _price(track, state.fit.model, step.term, without.excess)
         term = step.term
         if rivals and not stay and _takes_its_place(track, begin, without, state, own, rivals[0]):
             other = refit(track, rivals[0].fit.model, max_iterations=6)
             # What leaves something is not the simpler explanation beside one that leaves nothing.
             if state.excess > OF_FLOOR * state.floor or other.left - state.left < OF_FLOOR * state.floor:
-                state, term, rivals = other, rivals[0].names[0], rivals[1:]
+                state, term = other, rivals[0].names[0]
+                # What gives way is now a rival itself, and often the nearest.
+                rivals = [rival for rival in fitted if rival.effect.id != rivals[0].effect.id]
                 steps[:] = [each if each is step else renamed(each, model, place) for each in steps]
         price = _price(track, state.fit.model, term, without.excess)
         beside = without.left, state.left, without.floor, without.excess
