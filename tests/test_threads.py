@@ -44,6 +44,18 @@ def test_results_keep_their_order_and_what_a_thread_raises_arrives(threads: int)
         mapped(lambda number: 1 / number, range(-3, 3), threads)
 
 
+def test_what_runs_in_a_thread_may_share_its_work_out_again() -> None:
+    """With threads of the same pool it would wait for itself."""
+    assert mapped(lambda n: sum(mapped(lambda k: k * n, range(4), 2)), range(20), 2) == [6 * n for n in range(20)]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_a_forked_process_has_threads_of_its_own() -> None:
+    assert mapped(abs, [-1, -2], 2) == [1, 2]
+    with ProcessPoolExecutor(1, multiprocessing.get_context("fork")) as pool:
+        assert pool.submit(mapped, abs, [-3, -4], 2).result(timeout=20.0) == [3, 4]
+
+
 def test_linear_algebra_gets_its_threads_back() -> None:
     before = of_linear_algebra(threadpool_info())
     assert before

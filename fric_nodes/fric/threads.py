@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import lru_cache
 from multiprocessing import connection, parent_process
 from typing import TypeVar
 
@@ -25,6 +26,7 @@ Result = TypeVar("Result")
 
 _MOST = 8
 _NAME = "FRIC_THREADS"
+_of_thread = threading.local()
 _OF_LIBRARIES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
@@ -47,11 +49,26 @@ def mapped(function: Callable[[Item], Result], items: Iterable[Item], threads: i
 
     What one of them raises is raised here.
     """
-    threads = threads or n_threads()
-    if threads == 1:
-        return [function(item) for item in items]
-    with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(function, items))
+    work, threads = list(items), threads or n_threads()
+    # What runs in the pool would wait for ever for threads of the same pool.
+    if threads == 1 or len(work) < 2 or getattr(_of_thread, "works", False):
+        return [function(item) for item in work]
+    return list(_pool(threads).map(function, work))
+
+
+def _works() -> None:
+    """Mark the calling thread as one of a pool."""
+    _of_thread.works = True
+
+
+@lru_cache(maxsize=4)
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Kept: a diagnosis asks for it some thousand times, and threads take longer to start than to follow a short recording."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="fric", initializer=_works)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # threads don't come along
 
 
 def alone() -> None:

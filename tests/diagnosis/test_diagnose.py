@@ -347,7 +347,7 @@ def test_a_term_that_comes_out_at_nothing_is_not_told_of(presliding: tuple[objec
     nothing = replace(found.model, terms=(*found.model.terms, term("bias", force=0.0)), standard_errors={})
     steps = tuple(Step(name, 1.0, 0.1, 0.01, 0.9, (), ()) for name in ("bias", "presliding"))
     track = Track.of([draw(0, "moderate", "presliding").train[0]], 100.0, nothing)
-    state = State(track.fit(nothing, ("bias.force",), 1), 0.1, 0.01, ())
+    state = State(track.fit(nothing, ("bias.force",), 1), 0.1, lambda: (0.01, ()))
     growth = Growth(track, state, state, steps, (), 1.0)
     left, end = without_nothings(growth, nothing)
     assert [step.term for step in left.steps] == ["presliding"]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-from fric.diagnosis.fitting import refit
+from fric.diagnosis.fitting import State, refit
 from fric.diagnosis.growth import Growth
 from fric.diagnosis.judging import (
     HARDLY,
@@ -54,7 +55,7 @@ def grown(track: Track) -> Growth:
 def set_by_hand(growth: Growth, begin: tuple[float, float], end: tuple[float, float]) -> Growth:
     """The same with other sums of squares: left and floor of the nominal and of the grown model."""
     first, last = (
-        replace(state, left=left, floor=floor)
+        State(state.fit, left, partial(lambda each: (each, ()), floor))
         for state, (left, floor) in zip((growth.begin, growth.end), (begin, end), strict=True)
     )
     return replace(growth, begin=first, end=last)

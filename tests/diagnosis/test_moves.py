@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from fric.diagnosis.fitting import State, refit
-from fric.diagnosis.moves import alike, reconsidered
+from fric.diagnosis.moves import Search, alike, reconsidered
 from fric.diagnosis.track import Track
 from fric.effects import by_name
 from fric.model import Term, build_model, term
@@ -35,6 +35,18 @@ def test_a_term_that_does_nothing_goes_and_the_truth_stays() -> None:
     assert found.fit.model.value("quadratic_drag.coefficient") == pytest.approx(15.0, rel=0.02)
     assert len(said) == 1
     assert said[0].startswith("without")
+
+
+def test_a_move_that_lost_by_more_than_others_have_won_since_is_not_made_again() -> None:
+    track, begin, state = begun(DRAG, grown=(DRAG,))
+    search = Search(track, begin, state, frozenset(NOMINAL.prefixes), lambda _: None)
+    assert search.is_worth(("without", "quadratic_drag"))
+    search.judged(("without", "quadratic_drag"), begin)
+    by = search.score(state, False) - search.score(begin, False)
+    assert by > 100.0
+    for won, again in ((0.0, False), (0.9 * by, False), (1.1 * by, True)):
+        search.won = won
+        assert search.is_worth(("without", "quadratic_drag")) is again
 
 
 def test_the_right_structure_is_not_moved() -> None:

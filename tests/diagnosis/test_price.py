@@ -16,7 +16,7 @@ from .small_axis import NOMINAL
 
 def state(left: float, floor: float) -> State:
     nothing = Solution(np.zeros(0), np.zeros(1), np.zeros((1, 0)), True, 0, np.zeros(0, dtype=np.bool_))
-    return State(Fit(NOMINAL, (), nothing, np.zeros(0)), left, floor, ())
+    return State(Fit(NOMINAL, (), nothing, np.zeros(0)), left, lambda: (floor, ()))
 
 
 def tried(left: float, by_chance: float) -> Tried:

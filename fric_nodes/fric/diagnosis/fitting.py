@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -68,15 +69,22 @@ class State:
     Attributes:
         fit: to all blocks.
         left: sum of squares on unseen blocks [F^2], the more where the model minds the effort less.
-        floor: the same on twins of the model, their mean [F^2]; no more for that: it is what noise leaves, which tells nothing
-            of physics.
-        chance: residuals of the twins, shape ``(n,)`` each [F].
+        of_noise: makes ``floor`` and ``chance``; many a model is judged by what it leaves alone, and never asked for these.
     """
 
     fit: Fit
     left: float
-    floor: float
-    chance: tuple[Array, ...]
+    of_noise: Callable[[], tuple[float, tuple[Array, ...]]]
+
+    @property
+    def floor(self) -> float:
+        """What is left on unseen blocks of twins, their mean [F^2]: of noise. It is no more where the effort matters less."""
+        return self.of_noise()[0]
+
+    @property
+    def chance(self) -> tuple[Array, ...]:
+        """Residuals of the twins, shape ``(n,)`` each [F]."""
+        return self.of_noise()[1]
 
     @property
     def excess(self) -> float:
@@ -105,10 +113,13 @@ def free_names(model: Model) -> tuple[str, ...]:
 def refit(track: Track, model: Model, max_iterations: int = 12) -> State:
     """``model`` fitted to the track, and what it leaves."""
     fit = track.fit(model, free_names(model), max_iterations, bounds_of(model, scales_of(track)))
-    made = twins(track, fit.model, N_TWINS)
-    chance = tuple(track.residual(fit.model, twin) for twin in made)
-    floor = float(np.mean([unseen(track, fit, each) for each in chance]))
-    return State(fit, left_by(track, fit), floor, chance)
+
+    @cache
+    def of_noise() -> tuple[float, tuple[Array, ...]]:
+        chance = tuple(track.residual(fit.model, twin) for twin in twins(track, fit.model, N_TWINS))
+        return float(np.mean([unseen(track, fit, each) for each in chance])), chance
+
+    return State(fit, left_by(track, fit), of_noise)
 
 
 def left_by(track: Track, fit: Fit) -> float:

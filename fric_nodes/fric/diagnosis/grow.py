@@ -20,6 +20,7 @@ from .growth import AGAIN, FAINTLY, LITTLE, Growth, share_left
 from .moves import reconsidered
 from .price import implausible
 from .reproduced import reproduced
+from .rival import Rival
 from .settle import CLEARLY, HOPELESS, Step, audit, compared
 from .track import Track
 
@@ -111,13 +112,15 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
         moved = _moved(growth, tell)
         left = moved.end.excess
         if is_over() or not moved.steps or left < max(NOTHING * moved.end.floor, LITTLE * moved.begin.excess):
-            return moved
+            break
         more = extended_by_terms([moved.track], moved, None, tell, most=len(moved.steps) + _TO_COMPARE)
         if len(more.steps) == len(moved.steps):
-            return moved
+            break
         growth = settled_again(more)
         if not growth.steps or growth.rest >= moved.rest:
-            return moved
+            break
+    # Of terms that have come together, or in the place of others, none has been compared.
+    return replace(moved, steps=compared(moved.track, moved.begin, moved.end, moved.steps))
 
 
 def _moved(growth: Growth, tell: Callable[[str], None]) -> Growth:
@@ -131,13 +134,12 @@ def _moved(growth: Growth, tell: Callable[[str], None]) -> Growth:
         tell("comparing its effects with those that look like them" if little else "reconsidering its laws and values")
     state = reconsidered(growth.track, growth.begin, growth.end, tell, names_only=little)
     if state is growth.end:
-        compares = any(not step.rivals for step in growth.steps)  # of terms that have come together none has been compared
-        return replace(growth, steps=compared(growth.track, growth.begin, state, growth.steps)) if compares else growth
+        return growth
     more = reproduced(replace(growth, end=state, steps=_steps_of(growth, state), rest=_rest_of(growth, state)))
     # The moves have paid for their parameters in nats; halves of the recordings must not speak against what came of them.
     if not more.steps or more.rest > growth.rest + max(growth.dear - more.dear, 0.0):
         return growth
-    return replace(more, steps=compared(more.track, more.begin, more.end, more.steps))
+    return more
 
 
 def _rest_of(growth: Growth, state: State) -> float:
@@ -146,7 +148,10 @@ def _rest_of(growth: Growth, state: State) -> float:
 
 
 def _steps_of(growth: Growth, state: State) -> tuple[Step, ...]:
-    """The steps of ``growth`` as steps to ``state``, whose terms are among those or have come in the place of one."""
+    """The steps of ``growth`` as steps to ``state``, whose terms are among those or have come in the place of one.
+
+    The rivals of a term that has stayed are taken to leave less by as much as the whole does; others are to be compared anew.
+    """
     model = state.fit.model
     brought = added(growth.begin.fit.model, model)
     places: dict[int, int] = {}
@@ -158,13 +163,19 @@ def _steps_of(growth: Growth, state: State) -> tuple[Step, ...]:
     gone = [number for number in range(len(growth.steps)) if number not in places]
     places |= dict(zip(gone, brought, strict=False))
     steps = []
+    less = growth.end.left - state.left
     for number, place in sorted(places.items()):
         step = growth.steps[number]
         without = refit(growth.track, without_place(model, place), max_iterations=8)
         beside = without.left, state.left, without.floor, without.excess
-        rivals = tuple(each for each in step.rivals if each.effect.id != model.terms[place].effect.id)
+        rivals = tuple(_left_by(each, less, without.floor) for each in step.rivals) if number not in gone else ()
         steps.append(Step(model.prefixes[place], *beside, rivals, step.screened, step.price))
     return tuple(steps)
+
+
+def _left_by(rival: Rival, less: float, floor: float) -> Rival:
+    """``rival`` beside terms with which all leave ``less``, but no less than ``floor``."""
+    return replace(rival, left=max(rival.left - less, floor), fair=max(rival.fair - less, floor))
 
 
 def _best_growth(

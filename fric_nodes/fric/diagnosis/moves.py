@@ -28,7 +28,7 @@ from .screen import screen
 from .settle import TO_STAY
 from .track import Track
 
-__all__ = ["alike", "reconsidered"]
+__all__ = ["Search", "alike", "reconsidered"]
 
 _CLEARLY = 3.0  # statistical, nats: odds of twenty to one; a move that gains less isn't made
 _LAWS = 2  # of the best by themselves, that are also tried with each other term taken away
@@ -38,13 +38,28 @@ _ROUGHLY = 5  # iterations of such a fit before it is worth more
 
 
 @dataclass(eq=False)
-class _Search:
+class Search:
+    """A search by moves: where it is, and what moves have come to."""
+
     track: Track
     begin: State
     state: State
     own: frozenset[str]
     tell: Callable[[str], None]
     scores: dict[tuple[State, bool], float] = field(default_factory=dict)
+    won: float = 0.0  # by all moves [nats]
+    lost: dict[tuple[str, ...], tuple[float, float]] = field(default_factory=dict)
+
+    def is_worth(self, move: tuple[str, ...]) -> bool:
+        """Whether a move may be better by now: one that has lost by more than others have won since isn't tried again."""
+        by, then = self.lost.get(move, (-math.inf, 0.0))
+        return by < self.won - then
+
+    def judged(self, move: tuple[str, ...], state: State) -> State:
+        """``state``, remembered as what ``move`` came to."""
+        slips = self.state.fit.model.has_slip_dynamics or state.fit.model.has_slip_dynamics
+        self.lost[move] = (self.score(self.state, slips) - self.score(state, slips), self.won)
+        return state
 
     def score(self, state: State, with_slip: bool) -> float:
         """Log likelihood of unseen blocks, less the price of the structure [nats], as it counts beside slip dynamics or not."""
@@ -63,11 +78,7 @@ class _Search:
     @property
     def brought(self) -> list[int]:
         """Places of the terms that may go again."""
-        return self._brought_to(self.state.fit.model)
-
-    def _brought_to(self, model: Model) -> list[int]:
-        """Places of the terms of ``model`` that are not the nominal model's."""
-        return [k for k, held in enumerate(model.terms) if held.effect.key not in self.own]
+        return [k for k, held in enumerate(self.state.fit.model.terms) if held.effect.key not in self.own]
 
     def taken(self, made: Iterable[tuple[str, State]], same: bool = False) -> bool:
         """Whether the best of the moves is clearly better, and then is where the search goes on.
@@ -87,35 +98,42 @@ class _Search:
         if not (smaller or same) and self.state.left - best[1].left < TO_STAY * self.begin.excess:
             return False
         self.tell(f"{best[0]}: better by {better:.0f} nats")
+        self.won += better
         self.state = best[1]
         return True
 
     def without_each(self, state: State, but: int | None = None) -> list[tuple[str, State]]:
         """``state`` with each brought term taken away but that at the place ``but``, everything else fitted anew."""
         model = state.fit.model
-        return [
-            (f"without {model.terms[k].effect.title}", refit(self.track, without_place(model, k)))
-            for k in self.brought
-            if k != but
-        ]
+        made = []
+        for k in self.brought:
+            move = ("without", model.terms[k].effect.key, "" if but is None else model.terms[but].effect.key)
+            if k != but and self.is_worth(move):
+                left = self.judged(move, refit(self.track, without_place(model, k)))
+                made.append((f"without {model.terms[k].effect.title}", left))
+        return made
 
     def elsewhere(self) -> list[tuple[str, State]]:
         """The same structure from other values of what isn't linear: what sticks or gives way makes one valley for each."""
         state = self.state
         bounds = bounds_of(state.fit.model, scales_of(self.track))
-        best = float(state.fit.residual @ state.fit.residual), state.fit.model
-        for name, value in self._moved(state.fit.model):
+        now = float(state.fit.residual @ state.fit.residual)
+        best = now, state.fit.model
+        for name, value, factor in self._moved(state.fit.model):
             low, high = bounds.get(name, (-math.inf, math.inf))
-            if low < value < high:
+            move = ("from", name, str(factor))
+            if low < value < high and self.is_worth(move):
                 start = state.fit.model.with_value(name, value)
                 fit = self.track.fit(start, state.fit.names, _ROUGHLY, bounds)
-                best = min(best, (float(fit.residual @ fit.residual), fit.model), key=lambda each: each[0])
+                left = float(fit.residual @ fit.residual)
+                self.lost[move] = (0.5 * self.track.independent * math.log(max(left, 1e-300) / max(now, 1e-300)), self.won)
+                best = min(best, (left, fit.model), key=lambda each: each[0])
         return [] if best[1] is state.fit.model else [("from other values", refit(self.track, best[1]))]
 
-    def _moved(self, model: Model) -> list[tuple[str, float]]:
-        """Names of values that are not linear, each with another value."""
+    def _moved(self, model: Model) -> list[tuple[str, float, float]]:
+        """Names of values that are not linear, each with another value and by what factor it is another."""
         return [
-            (f"{model.prefixes[k]}.{p.name}", value * factor)
+            (f"{model.prefixes[k]}.{p.name}", value * factor, factor)
             for k in self.brought
             for p, value in zip(model.terms[k].effect.parameters, model.terms[k].values, strict=True)
             if not p.linear and not p.shape and p.name != "period" and value != 0.0
@@ -126,7 +144,11 @@ class _Search:
         """With half of the friction on the motor's side of a transmission, or with none there."""
         model = self.state.fit.model
         tried = {"friction of the motor": half_on_motor(model), "no friction of the motor": all_on_load(model)}
-        return [(what, refit(self.track, start)) for what, start in tried.items() if start is not None]
+        return [
+            (what, self.judged((what,), refit(self.track, start)))
+            for what, start in tried.items()
+            if start is not None and self.is_worth((what,))
+        ]
 
     def other_laws(self) -> list[tuple[str, State]]:
         """Each term by each other law of its effect; the best of these also with each other term taken away.
@@ -137,8 +159,11 @@ class _Search:
         made: list[tuple[str, int, State]] = []
         for k in self.brought:
             for law in laws_in_place(self.track, self.state.fit, k):
+                move = ("by another law", model.terms[k].effect.key, law.effect.key, *map(str, _shape_of(law)))
+                if not self.is_worth(move):
+                    continue
                 terms: list[Term] = [law if k == place else held for place, held in enumerate(model.terms)]
-                state = refit(self.track, model.with_terms(terms))
+                state = self.judged(move, refit(self.track, model.with_terms(terms)))
                 if told(state.fit.model.terms[k], scales):
                     made.append((f"{law.effect.title} by another law ({law.effect.law})", k, state))
         slips = any(state.fit.model.has_slip_dynamics for *_, state in made)
@@ -169,31 +194,27 @@ class _Search:
             if is_over():
                 break
             held = model.terms[k].effect
-            without = refit(self.track, without_place(model, k))
-            like = [each for each in candidates(without.fit.model, scales) if alike(each.effect, held)]
+            begun_without = without_place(model, k)
+            like = [each for each in candidates(begun_without, scales) if alike(each.effect, held)]
+            like = [each for each in like if self.is_worth(("exchanged", held.key, each.effect.id))]
+            if not like:
+                continue
+            without = refit(self.track, begun_without)
             alone = [Candidate(each.effect, (trial,)) for each in like for trial in each.trials]
             for effect_id in dict.fromkeys(each.effect.id for each in like):
                 of_it = [each for each in alone if each.effect.id == effect_id]
                 tried = screen(self.track, without.fit, of_it, without.chance, in_pairs=False).tried
                 starts = [begun(self.track, without.fit, [each], scales, along).model for each in tried[:_LAWS]]
                 states = [refit(self.track, start) for start in starts]
-                if states:
-                    states += self._by_other_laws(min(states, key=lambda each: each.left), effect_id)
+                for state in sorted(states, key=lambda each: each.left)[:1]:
+                    self.judged(("exchanged", held.key, effect_id), state)
                 made += [(f"{effect_id} in the place of {held.id}", state) for state in states]
         return made
 
-    def _by_other_laws(self, state: State, effect_id: str) -> list[State]:
-        """``state`` with each other law of the effect ``effect_id`` that came: it mustn't lose by the form of its usual law."""
-        model, scales = state.fit.model, scales_of(self.track)
-        found = []
-        for k in (k for k in self._brought_to(model) if model.terms[k].effect.id == effect_id):
-            for law in laws_in_place(self.track, state.fit, k):
-                tried = refit(
-                    self.track, model.with_terms(law if k == place else held for place, held in enumerate(model.terms))
-                )
-                if told(tried.fit.model.terms[k], scales):
-                    found.append(tried)
-        return found
+
+def _shape_of(held: Term) -> list[float]:
+    """The values of ``held`` that are shapes, which no fit moves."""
+    return [value for p, value in zip(held.effect.parameters, held.values, strict=True) if p.shape]
 
 
 def alike(one: Effect, other: Effect) -> bool:
@@ -212,7 +233,7 @@ def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str],
         names_only: only drop terms, or exchange them for effects that look like them.
     """
     own = frozenset(held.effect.key for held in begin.fit.model.terms)
-    search = _Search(track, begin, state, own, tell)
+    search = Search(track, begin, state, own, tell)
     for _ in range(_MOVES):
         if search.taken(search.without_each(search.state)):
             continue

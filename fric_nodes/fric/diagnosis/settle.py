@@ -128,7 +128,7 @@ def exchanged(track: Track, done: Settled) -> Settled:
 
 
 def compared(track: Track, begin: State, state: State, steps: Sequence[Step]) -> tuple[Step, ...]:
-    """``steps`` to ``state`` with what their rivals come to in the place of each, which all stay."""
+    """``steps`` to ``state``, where there are none yet with what their rivals come to in the place of each; all steps stay."""
     if is_over():
         return tuple(steps)
     return tuple(_exchanged(track, begin, state, list(steps), scales_of(track), stay=True)[1])
@@ -259,11 +259,11 @@ def _exchanged(
 ) -> tuple[State, list[Step]]:
     """Each term against its rivals with all the others there: what came first was chosen while the others were missing.
 
-    If the terms are to ``stay``, they are only compared.
+    If the terms are to ``stay``, those that have no rivals yet are compared with theirs.
     """
     for k in range(len(steps)):
         step, model = steps[k], state.fit.model
-        if step.term not in model.prefixes:
+        if step.term not in model.prefixes or (stay and step.rivals):
             continue
         place = model.prefixes.index(step.term)
         effect_id = model.terms[place].effect.id
