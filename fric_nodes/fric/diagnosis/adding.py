@@ -69,9 +69,7 @@ def extended_by_terms(
             rivals = _told_apart(tracks, track, state, rivals)
         best = rivals[0]
         beginnings = beginnings if steps else tuple(rivals[1:])
-        tell(
-            f"{' and '.join(best.names)}: {100 * (state.left - best.left) / max(state.excess, 1e-300):.0f} % of what is missing"
-        )
+        tell(f"{' and '.join(best.names)}: {_taken(state, best)}")
         steps += _steps_by(best, state, tuple(rivals[1:]), last)
         # What is left may show best to another observer.
         track, state = best_track(tracks, best.fit.model, 6, floors, track)
@@ -90,6 +88,13 @@ def extended_by_terms(
         ended = most == _MOST_TERMS and len(steps) >= most  # and not because the time is over
         last = screened(track, state) if most == _MOST_TERMS else last
     return replace(growth, track=track, end=state, steps=tuple(steps), last=last, beginnings=beginnings, ended=ended)
+
+
+def _taken(state: State, best: Rival) -> str:
+    """What ``best`` takes of what ``state`` lacks, in words: of what noise may be as well no share tells anything."""
+    if state.excess < NOTHING * state.floor:
+        return "faint"
+    return f"{100 * (state.left - best.left) / state.excess:.0f} % of what is missing"
 
 
 def _steps_by(best: Rival, state: State, others: tuple[Rival, ...], last: tuple[Tried, ...]) -> list[Step]:
