@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fric.diagnosis.diagnose import diagnose
 from fric.diagnosis.faint import faint_term
 from fric.diagnosis.fitting import refit
+from fric.diagnosis.prove.cases import draw
 from fric.diagnosis.track import Track
 from fric.model import Term, term
 
@@ -44,6 +46,12 @@ def test_a_ripple_in_noise_is_found_by_the_observer_to_which_it_stands_out() -> 
 @pytest.mark.parametrize("seed", range(2))
 def test_noise_alone_is_no_term(seed: int) -> None:
     assert faint_term(tracks(seed=seed), NOMINAL, quietly) is None
+
+
+def test_what_only_passes_less_of_the_noise_on_explains_nothing() -> None:
+    """Hysteresis over acceleration seemed to explain the noise of an axis that lacks nothing: it does so on its twin, too."""
+    case = draw(4023, "nothing", (), "events")
+    assert not diagnose(case.train, case.validation, case.nominal).mismatch
 
 
 def test_where_the_force_between_samples_is_unsure_nothing_faint_is_told() -> None:

@@ -11,12 +11,14 @@ from dataclasses import replace
 from ..model import Model
 from .adding import extended_by_terms, grown_on
 from .candidates import candidates, scales_of
-from .fitting import State, refit
+from .fitting import State, bounds_of, free_names, refit, unseen
 from .growth import Growth
 from .price import BY_CHANCE
+from .rival import Rival
 from .rivals import rivals_of
 from .screen import Screening, Tried, screen
 from .track import Track
+from .twin import twins
 
 __all__ = ["faint_term"]
 
@@ -53,11 +55,27 @@ def faint_term(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], No
     if not rivals:
         return None
     others = [state.left - rival.left for rival in rivals if rival.effect.id != rivals[0].effect.id]
-    if max(others, default=0.0) > _ALIKE * (state.left - rivals[0].left):
+    gain = state.left - rivals[0].left
+    if max(others, default=0.0) > _ALIKE * gain:
+        return None
+    if gain - _of_noise(track, state, rivals[0]) < _chance_of(track, state, rivals[0].offer):
         return None
     return grown_on(
         [track], extended_by_terms([track], Growth(track, state, state, (), (), 1.0), rivals[0], tell, most=1), tell
     )
+
+
+def _of_noise(track: Track, state: State, rival: Rival) -> float:
+    """What the model of ``rival`` takes off a twin of ``state``, where nothing is missing, both fitted to it [F^2].
+
+    A term that goes with acceleration, or with the force itself, can pass less of the noise on, and seem to explain it.
+    """
+    (twin,) = twins(track, state.fit.model, 1)
+    left = []
+    for model in (state.fit.model, rival.fit.model):
+        fit = track.fit(model, free_names(model), bounds=bounds_of(model, scales_of(track)), twin=twin)
+        left.append(unseen(track, fit, fit.residual))
+    return left[0] - left[1]
 
 
 def _chance_of(track: Track, state: State, tried: Sequence[Tried]) -> float:
