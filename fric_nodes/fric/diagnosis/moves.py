@@ -107,7 +107,7 @@ class Search:
         model = state.fit.model
         made = []
         for k in self.brought:
-            move = ("without", model.terms[k].effect.key, "" if but is None else model.terms[but].effect.key)
+            move = ("without", model.prefixes[k], "" if but is None else model.terms[but].effect.key)
             if k != but and self.is_worth(move):
                 left = self.judged(move, refit(self.track, without_place(model, k)))
                 made.append((f"without {model.terms[k].effect.title}", left))
@@ -159,7 +159,7 @@ class Search:
         made: list[tuple[str, int, State]] = []
         for k in self.brought:
             for law in laws_in_place(self.track, self.state.fit, k):
-                move = ("by another law", model.terms[k].effect.key, law.effect.key, *map(str, _shape_of(law)))
+                move = ("by another law", model.prefixes[k], law.effect.key, *map(str, _shape_of(law)))
                 if not self.is_worth(move):
                     continue
                 terms: list[Term] = [law if k == place else held for place, held in enumerate(model.terms)]
@@ -196,7 +196,7 @@ class Search:
             held = model.terms[k].effect
             begun_without = without_place(model, k)
             like = [each for each in candidates(begun_without, scales) if alike(each.effect, held)]
-            like = [each for each in like if self.is_worth(("exchanged", held.key, each.effect.id))]
+            like = [each for each in like if self.is_worth(("exchanged", model.prefixes[k], each.effect.id))]
             if not like:
                 continue
             without = refit(self.track, begun_without)
@@ -207,7 +207,7 @@ class Search:
                 starts = [begun(self.track, without.fit, [each], scales, along).model for each in tried[:_LAWS]]
                 states = [refit(self.track, start) for start in starts]
                 for state in sorted(states, key=lambda each: each.left)[:1]:
-                    self.judged(("exchanged", held.key, effect_id), state)
+                    self.judged(("exchanged", model.prefixes[k], effect_id), state)
                 made += [(f"{effect_id} in the place of {held.id}", state) for state in states]
         return made
 
