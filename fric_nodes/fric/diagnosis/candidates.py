@@ -277,7 +277,9 @@ def _lengths(effect: Effect, parameter: Parameter, scales: Scales) -> Array:
         return np.asarray(scales.travel / np.arange(fewest_cycles(effect), _MOST_PERIODS + 0.25, 0.5))
     if not parameter.positive and parameter.lower < 0.0:
         if parameter.default is not None:
-            return np.array([parameter.default]) if not scales.low <= 0.0 <= scales.high else np.array([0.0])
+            # Where the sensor counts from may be far from the travel: there a spring would be nothing but an offset.
+            within = scales.low <= parameter.default <= scales.high
+            return np.array([parameter.default if within else 0.5 * (scales.low + scales.high)])
         return np.linspace(scales.low, scales.high, 13)[1:-1]
     if parameter.name == "gap":
         return np.geomspace(max(3.0 * scales.grain, 1e-5 * scales.travel), 0.03 * scales.travel, 10)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from .candidates import scales_of
-from .fitting import State, refit
+from .fitting import State, exchanged_at, refit
 from .other_laws import laws_in_place, told
 from .settle import Step
 from .track import Track
@@ -29,15 +29,16 @@ def with_best_laws(track: Track, state: State, steps: Sequence[Step], tell: Call
     for number, step in enumerate(steps):
         model = state.fit.model
         place = list(model.prefixes).index(step.term)
-        best = state
+        best, at = state, place
         for term in laws_in_place(track, state.fit, place):
-            tried = refit(track, model.with_terms(term if k == place else held for k, held in enumerate(model.terms)))
-            if told(tried.fit.model.terms[place], scales_of(track)):
-                best = min(best, tried, key=lambda each: each.left)
+            other, its = exchanged_at(model, place, term)
+            tried = refit(track, other)
+            if tried.left < best.left and told(tried.fit.model.terms[its], scales_of(track)):
+                best, at = tried, its
         if state.left - best.left <= _BETTER * state.excess or state.excess == 0.0:
             continue
-        law = best.fit.model.terms[place].effect.law
+        law = best.fit.model.terms[at].effect.law
         tell(f"{step.term} by the law {law}: leaves {100.0 * best.excess / state.excess:.0f} % of what was left")
-        found[number] = replace(step, term=best.fit.model.prefixes[place], after=max(step.after - state.left + best.left, 0.0))
+        found[number] = replace(step, term=best.fit.model.prefixes[at], after=max(step.after - state.left + best.left, 0.0))
         state = best
     return state, found

@@ -20,7 +20,7 @@ from .along import Along
 from .candidates import Candidate, candidates, scales_of
 from .costs import NATS_PER_PARAMETER
 from .deadline import is_over
-from .fitting import NOTHING, State, begun, bounds_of, free_names, left_beside, refit, without_place
+from .fitting import NOTHING, State, begun, bounds_of, exchanged_at, free_names, left_beside, refit, without_place
 from .motor_side import all_on_load, half_on_motor
 from .other_laws import laws_in_place, told
 from .price import implausible
@@ -78,7 +78,11 @@ class Search:
     @property
     def brought(self) -> list[int]:
         """Places of the terms that may go again."""
-        return [k for k, held in enumerate(self.state.fit.model.terms) if held.effect.key not in self.own]
+        return self._brought_to(self.state.fit.model)
+
+    def _brought_to(self, model: Model) -> list[int]:
+        """Places of the terms that came to ``model``."""
+        return [k for k, held in enumerate(model.terms) if held.effect.key not in self.own]
 
     def taken(self, made: Iterable[tuple[str, State]], same: bool = False) -> bool:
         """Whether the best of the moves is clearly better, and then is where the search goes on.
@@ -106,7 +110,7 @@ class Search:
         """``state`` with each brought term taken away but that at the place ``but``, everything else fitted anew."""
         model = state.fit.model
         made = []
-        for k in self.brought:
+        for k in self._brought_to(model):
             move = ("without", model.prefixes[k], "" if but is None else model.terms[but].effect.key)
             if k != but and self.is_worth(move):
                 left = self.judged(move, refit(self.track, without_place(model, k)))
@@ -162,10 +166,10 @@ class Search:
                 move = ("by another law", model.prefixes[k], law.effect.key, *map(str, _shape_of(law)))
                 if not self.is_worth(move):
                     continue
-                terms: list[Term] = [law if k == place else held for place, held in enumerate(model.terms)]
-                state = self.judged(move, refit(self.track, model.with_terms(terms)))
-                if told(state.fit.model.terms[k], scales):
-                    made.append((f"{law.effect.title} by another law ({law.effect.law})", k, state))
+                other, place = exchanged_at(model, k, law)
+                state = self.judged(move, refit(self.track, other))
+                if told(state.fit.model.terms[place], scales):
+                    made.append((f"{law.effect.title} by another law ({law.effect.law})", place, state))
         slips = any(state.fit.model.has_slip_dynamics for *_, state in made)
         made.sort(key=lambda each: -self.score(each[2], slips))
         fewer = [(f"{what}, {which}", state) for what, k, whole in made[:_LAWS] for which, state in self.without_each(whole, k)]

@@ -12,7 +12,7 @@ from dataclasses import replace
 from ..effect import Effect
 from ..model import Term
 from .candidates import Scales
-from .fitting import State, bounds_of, free_names
+from .fitting import State, bounds_of, exchanged_at, free_names
 from .other_laws import laws_beside, laws_further, told
 from .price import OF_FLOOR, price_of
 from .rival import Rival, rival_of
@@ -33,18 +33,19 @@ def shaped(track: Track, state: State, rival: Rival, found: Screening, scales: S
     """
     best = rival
     for each in rival.offer:
-        own = [k for k, held in enumerate(best.fit.model.terms) if held.effect is each.column.term.effect]
+        begun = best.fit.model
+        own = [k for k, held in enumerate(begun.terms) if held.effect is each.column.term.effect]
         if not own or rival.left < (1.0 + OF_FLOOR) * state.floor:
             continue
-        held = best.fit.model.terms[own[-1]]
+        held = begun.terms[own[-1]]
         for term in laws_beside(held, scales):
             if term.effect.slip is not None and term.effect is not held.effect:
                 continue  # is tried when the effect has come
-            model = best.fit.model.with_terms(term if k == own[-1] else one for k, one in enumerate(best.fit.model.terms))
+            model, place = exchanged_at(begun, own[-1], term)
             fit = track.fit(model, free_names(model), 8, bounds_of(model, scales))
             other = rival_of(track, state, rival.offer, fit, found)
             dearer = rival.dear + price_of(term.effect, state.excess) - price_of(held.effect, state.excess) - best.dear
-            if best.left - other.left > max(OF_FLOOR * state.floor, dearer) and told(fit.model.terms[own[-1]], scales):
+            if best.left - other.left > max(OF_FLOOR * state.floor, dearer) and told(fit.model.terms[place], scales):
                 fair = other.left * rival.fair / max(rival.left, 1e-300)
                 best = replace(other, fair=fair, dear=best.dear + dearer)
     return best
