@@ -389,7 +389,7 @@ def without_place(model: Model, place: int) -> Model:
 
 
 def exchanged_at(model: Model, place: int, term: Term) -> tuple[Model, int]:
-    """``model`` with ``term`` for its term number ``place``, and the number that it has: another law may come earlier or later."""
+    """``model`` with ``term`` for its term number ``place``, and the number that it has: terms are kept in an order."""
     other = model.with_terms(term if k == place else held for k, held in enumerate(model.terms))
     return other, next(k for k, held in enumerate(other.terms) if held is term)
 

@@ -25,29 +25,31 @@ def injection_page(bare: Diagnosis, outcomes: Sequence[InjectionOutcome], comman
         (
             each.what.effect,
             f"{each.what.times:g}",
-            f"{significant(each.rms, 3)} {unit}",
-            f"{100 * each.presence:.0f} %",
+            f"{significant(each.rest, 3)} {unit}",
+            f"{significant(each.rms, 3)} {unit}" if each.asked else "",
+            f"{100 * each.presence:.0f} %" if each.asked else "",
             each.failure or ("found" if each.found else "not found"),
             ", ".join(each.wrong),
         )
         for each in outcomes
     ]
-    hits = sum(each.found for each in outcomes)
+    asked = [each for each in outcomes if each.asked]
+    hits = sum(each.found for each in asked)
     wrong = sum(bool(each.wrong) for each in outcomes)
     note = (
         "Each effect was added to the recorded effort as the force that it would have needed along the measured motion; a "
-        "delay is the effort ahead of its time. The size is a multiple of the force that stays unexplained in the recordings "
-        "as they are."
+        "delay is the effort ahead of its time. Its size is what it leaves missing beside the nominal model's parameters, "
+        "where it acts, as a multiple of what stays unexplained there in the recordings as they are."
     )
-    head = ("effect", "times the rest", "added force, rms", "presence", "", "named wrongly")
+    head = ("effect", "times the rest", "rest there, rms", "added force, rms", "presence", "", "named wrongly")
     return render(
         f"What a diagnosis finds in recordings of '{bare.given.joint}'",
         f"Made by {command}",
         [
             Section(
-                "", (paragraph(f"{hits} of {len(outcomes)} concealed effects found; in {wrong} another was named.", "verdict"),)
+                "", (paragraph(f"{hits} of {len(asked)} concealed effects found; in {wrong} another was named.", "verdict"),)
             ),
-            Section("Concealed effects", (table(head, rows, text_columns=(0, 4, 5)), paragraph(note, "note"))),
+            Section("Concealed effects", (table(head, rows, text_columns=(0, 5, 6)), paragraph(note, "note"))),
             Section("The recordings as they are", (paragraph(bare.sentence),)),
         ],
     )

@@ -25,7 +25,7 @@ class Injections:
     """What is concealed in recordings of one's own, and how it is diagnosed."""
 
     sizes: Annotated[
-        str, typer.Option("--sizes", help="With --inject: sizes, as multiples of the force that stays unexplained.")
+        str, typer.Option("--sizes", help="With --inject: sizes, as multiples of what stays unexplained where the effect acts.")
     ] = "3,6"
     only: Annotated[str, typer.Option("--only", help="With --inject: effects, separated by commas. If not given: all.")] = ""
     blocks: Annotated[
@@ -199,13 +199,14 @@ def _inject(
     write_text(out / "injection.html", injection_page(bare, outcomes, command))
     result = {
         "found": sum(each.found for each in outcomes),
-        "of": len(outcomes),
+        "of": sum(each.asked for each in outcomes),
         "with_wrong_names": sum(bool(each.wrong) for each in outcomes),
         "outcomes": [
             {
                 "effect": each.what.effect,
                 "times": each.what.times,
                 "rms": each.rms,
+                "rest": each.rest,
                 "presence": each.presence,
                 "wrong": list(each.wrong),
                 "failure": each.failure,
@@ -218,7 +219,7 @@ def _inject(
         typer.echo(json.dumps(result))
         return
     typer.echo(
-        f"{result['found']} of {len(outcomes)} concealed effects found; in {result['with_wrong_names']} another was named"
+        f"{result['found']} of {result['of']} concealed effects found; in {result['with_wrong_names']} another was named"
     )
     typer.echo(f"written: {out / 'injection.html'}")
 

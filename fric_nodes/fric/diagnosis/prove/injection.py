@@ -6,8 +6,7 @@ the recorded effort ahead of its time, a lag the recorded effort with as much of
 friction of a gear asks for more of the effort that drives and for less of the effort that brakes. The recording as it is
 stands beside: what is found there is the axis's own and counts neither way.
 
-The size of an effect is a multiple of what the grown model of the recording as it is leaves unexplained, as root mean square of
-the added force where it acts.
+How large an effect has to be to leave a multiple of what stays unexplained in the recording as it is says :mod:`.yardstick`.
 """
 
 from __future__ import annotations
@@ -98,7 +97,7 @@ class Injected:
 
     Attributes:
         effect: id of the vocabulary.
-        times: what stays unexplained in the recording as it is.
+        times: what stays unexplained in the recording as it is, where the effect acts.
     """
 
     effect: str
@@ -110,34 +109,32 @@ def injections(sizes: Sequence[float]) -> list[Injected]:
     return [Injected(effect, size) for effect in (*INJECTED, *CHANGED) for size in sizes]
 
 
-def injected(records: Sequence[Record], what: Injected, rest: float) -> tuple[list[Record], float]:
-    """``records`` with the effect concealed in their effort, and the root mean square of what was added where it acts [F].
+def injected(records: Sequence[Record], effect: str, size: float) -> list[Record]:
+    """``records`` with ``effect`` concealed in their effort.
 
     Args:
         records: of one axis.
-        what: to conceal.
-        rest: root mean square of the force that stays unexplained in them as they are [F].
+        effect: id of the vocabulary, of :data:`INJECTED` or :data:`CHANGED`.
+        size: root mean square of the force that is added where the effect acts [F].
     """
     motions = [_motion(record) for record in records]
     fast = float(np.quantile(np.abs(np.concatenate([each.velocity for each in motions])), _FAST))
     low = min(float(np.min(each.position)) for each in motions)
     high = max(float(np.max(each.position)) for each in motions)
     moved, made = [], []
+    changing = CHANGED.get(effect)
     for record, each in zip(records, motions, strict=True):
         sign = np.where(np.abs(each.velocity) > _REST * fast, np.sign(each.velocity), 0.0)
         motion = replace(each, sign=sign, fast=fast, low=low, high=high)
         moved.append(motion)
-        changing = CHANGED.get(what.effect)
-        made.append(INJECTED[what.effect](motion) if changing is None else changing.slope(record, motion))
+        made.append(INJECTED[effect](motion) if changing is None else changing.slope(record, motion))
     joined = np.concatenate(made)
     acts = np.abs(joined) > _ACTS * float(np.max(np.abs(joined)))
-    size = what.times * rest / float(np.sqrt(np.mean(joined[acts] ** 2)))
-    changed = []
-    for record, motion, force in zip(records, moved, made, strict=True):
-        changing = CHANGED.get(what.effect)
-        effort = record.effort + size * force if changing is None else changing.effort(record, motion, size)
-        changed.append(replace(record, effort=effort))
-    return changed, what.times * rest
+    scale = size / float(np.sqrt(np.mean(joined[acts] ** 2)))
+    return [
+        replace(record, effort=record.effort + scale * force if changing is None else changing.effort(record, motion, scale))
+        for record, motion, force in zip(records, moved, made, strict=True)
+    ]
 
 
 def _motion(record: Record) -> Motion:

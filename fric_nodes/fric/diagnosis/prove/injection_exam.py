@@ -13,6 +13,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...errors import InputError
 from ...files import write_text
 from ...model import Model
@@ -25,9 +27,12 @@ from ..diagnose import diagnose
 from ..result import Diagnosis, Finding
 from .examination import in_processes
 from .injection import Injected, injected
+from .yardstick import Yardstick
 
-__all__ = ["InjectionOutcome", "examined", "told_in"]
+__all__ = ["CANNOT_SHOW", "InjectionOutcome", "examined", "told_in"]
 
+CANNOT_SHOW = "can't show in this motion"
+"""Of an effect that the nominal model's own parameters take up, or that would have to be larger than the force itself."""
 _FOLDER = "injected"
 
 
@@ -38,6 +43,7 @@ class InjectionOutcome:
     Attributes:
         what: was injected.
         rms: root mean square of the added force where it acts [F].
+        rest: that of what stays unexplained there in the recordings as they are [F].
         presence: of the injected effect; 0 where it isn't named.
         wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor named so in the
             recordings as they are.
@@ -46,9 +52,15 @@ class InjectionOutcome:
 
     what: Injected
     rms: float
+    rest: float
     presence: float
     wrong: tuple[str, ...]
     failure: str = ""
+
+    @property
+    def asked(self) -> bool:
+        """False where nothing was concealed, since it could not have shown."""
+        return self.failure != CANNOT_SHOW
 
     @property
     def found(self) -> bool:
@@ -86,9 +98,17 @@ def examined(
     progress("diagnosing the recordings as they are")
     bare = diagnose(*in_blocks(records, n_blocks), nominal, at_most=at_most)
     own = {each.effect: each.confidence for each in reversed(bare.findings)}
-    rest = bare.force_errors[1] if bare.force_errors is not None else 0.0
     waiting = [what for what in wanted if not _at(out, what).exists()]
-    tasks = [(str(_at(out, what)), what, records, nominal, rest, n_blocks, own, at_most) for what in waiting]
+    yardstick = Yardstick(records, bare)
+    measures = {effect: yardstick.measure(effect) for effect in dict.fromkeys(what.effect for what in waiting)}
+    most = float(np.sqrt(np.mean(np.concatenate([each.effort for each in records]) ** 2)))
+    tasks: list[tuple[object, ...]] = []
+    for what in waiting:
+        rest, size = measures[what.effect].rest, measures[what.effect].size(what.times)
+        if size > most:
+            _write(out, what, 0.0, rest, own, CANNOT_SHOW, ())
+        else:
+            tasks.append((str(out), what, records, nominal, size, rest, n_blocks, own, at_most))
     in_processes(_diagnosed, tasks, progress, "diagnosed", jobs)
     return bare, [_outcome(json.loads(_at(out, what).read_text(encoding="utf-8"))) for what in wanted]
 
@@ -121,26 +141,42 @@ def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int, 
 
 
 def _diagnosed(
-    at: str,
+    out: str,
     what: Injected,
     records: Sequence[Record],
     nominal: Model,
+    size: float,
     rest: float,
     n_blocks: int,
     own: Mapping[str, float],
     at_most: float | None,
 ) -> None:
     """Diagnose ``records`` with ``what`` concealed in them, and write down what was said."""
-    changed, rms = injected(records, what, rest)
     failure = ""
     findings: tuple[Finding, ...] = ()
     try:
+        changed = injected(records, what.effect, size)
         findings = diagnose(*in_blocks(changed, n_blocks), nominal, at_most=at_most).findings
     except InputError as error:
         failure = str(error)
-    told = {"injected": asdict(what), "rms": rms, "own": dict(own), "failure": failure, "findings": [*map(_said, findings)]}
-    Path(at).parent.mkdir(parents=True, exist_ok=True)
-    write_text(Path(at), json.dumps(told, indent=1))
+    _write(Path(out), what, size, rest, own, failure, findings)
+
+
+def _write(
+    out: Path,
+    what: Injected,
+    size: float,
+    rest: float,
+    own: Mapping[str, float],
+    failure: str,
+    findings: Sequence[Finding],
+) -> None:
+    """Write down what was said of one."""
+    told = {"injected": asdict(what), "rms": size, "rest": rest, "own": dict(own)}
+    told |= {"failure": failure, "findings": [*map(_said, findings)]}
+    at = _at(out, what)
+    at.parent.mkdir(parents=True, exist_ok=True)
+    write_text(at, json.dumps(told, indent=1))
 
 
 def _said(finding: Finding) -> dict[str, Any]:
@@ -155,4 +191,4 @@ def _outcome(told: dict[str, Any]) -> InjectionOutcome:
     sure = {each["effect"]: each["confidence"] for each in reversed(told["findings"])}
     own = {effect for effect, confidence in told["own"].items() if confidence >= AS_LIKELY}
     wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in {what.effect, "unknown", *own})
-    return InjectionOutcome(what, told["rms"], sure.get(what.effect, 0.0), tuple(sorted(wrong)), told["failure"])
+    return InjectionOutcome(what, told["rms"], told["rest"], sure.get(what.effect, 0.0), tuple(sorted(wrong)), told["failure"])

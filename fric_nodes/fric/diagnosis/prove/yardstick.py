@@ -1,0 +1,99 @@
+"""How large an effect is made that is concealed in a recording: by what it leaves missing there, beside what is missing anyway.
+
+The unit is what stays unexplained where the effect acts. What an effect leaves missing is reckoned as an observer sees it that
+follows the recording as a diagnosis does, after the parameters of the nominal model have taken up what they can of it: of
+friction that levels off slowly a Coulomb level takes up most, and what is left is all that a diagnosis can find. And where the
+axis itself lacks the opposite, that is made up for first: two that cancel each other leave nothing to be found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...identification.equations import nominal_conditions
+from ...instrument import inspect
+from ...record import Array, Record
+from ...signals.stamps import evened
+from ..candidates import scales_of
+from ..fitting import bounds_of, free_names
+from ..intake import of_use, without_faults
+from ..result import Diagnosis
+from ..screen import OWN
+from ..start import lateness
+from ..track import Track
+from .injection import injected
+
+__all__ = ["Measure", "Yardstick"]
+
+_ACTS = 0.05  # of its largest value: where less is missing the effect does not act
+_LITTLE = 0.01  # of the force of friction: an added force so small that it changes nothing but in proportion
+
+
+@dataclass(frozen=True)
+class Measure:
+    """How large an effect has to be.
+
+    Attributes:
+        unit: root mean square of the added force that leaves missing as much as stays unexplained where it acts [F]; infinite
+            where the parameters of the nominal model take up all of it.
+        opposite: that makes up for the opposite that the axis itself lacks [F].
+        rest: root mean square of what stays unexplained where the effect acts [F].
+    """
+
+    unit: float
+    opposite: float
+    rest: float
+
+    def size(self, times: float) -> float:
+        """Of an effect that leaves ``times`` as much missing as stays unexplained anyway [F]."""
+        return self.opposite + times * self.unit
+
+
+class Yardstick:
+    """Says how large effects have to be in recordings that have been diagnosed as they are.
+
+    Args:
+        records: of one axis.
+        bare: their diagnosis; what its model leaves is what stays unexplained.
+    """
+
+    def __init__(self, records: Sequence[Record], bare: Diagnosis) -> None:
+        usable, _ = of_use(records)
+        whole, _, _ = without_faults(usable, [], bare.given, inspect(usable, bare.given))
+        conditions = nominal_conditions(whole) | dict(bare.given.nominal)
+        self.records = [evened(replace(record, nominal=conditions)) for record in whole]
+        self._nominal = bare.refit
+        late = lateness(self.records, bare.refit)
+        self._late, self._bandwidth = late, bare.bandwidth
+        track = self._track(self.records)
+        fit = track.fit(bare.refit, free_names(bare.refit), 1, bounds_of(bare.refit, scales_of(track)))
+        columns = fit.jacobian[:, fit.solution.free]
+        self._taken_up, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+        self._lacking = track.residual(bare.refit)
+        self._stays = track.residual(bare.model)
+        self._little = _LITTLE * scales_of(track).level
+
+    def _track(self, records: Sequence[Record]) -> Track:
+        track = Track.of(records, self._bandwidth, self._nominal, self._late)
+        return replace(track, mass=self._nominal.total_inertia)
+
+    def missing(self, effect: str) -> Array:
+        """What a little of ``effect`` leaves missing, per newton that it was made large [1], shape ``(n,)``."""
+        changed = injected(self.records, effect, self._little)
+        added = (self._track(changed).residual(self._nominal) - self._lacking) / self._little
+        left = added - self._taken_up @ (self._taken_up.T @ added)
+        return left if np.linalg.norm(left) > OWN * np.linalg.norm(added) else np.zeros_like(left)
+
+    def measure(self, effect: str) -> Measure:
+        """How large ``effect`` has to be."""
+        missing = self.missing(effect)
+        most = float(np.max(np.abs(missing)))
+        if most == 0.0:
+            return Measure(np.inf, 0.0, 0.0)
+        acts = np.abs(missing) > _ACTS * most
+        rest = float(np.sqrt(np.mean(self._stays[acts] ** 2)))
+        along = float(self._lacking @ missing) / float(missing @ missing)
+        return Measure(rest / float(np.sqrt(np.mean(missing[acts] ** 2))), max(-along, 0.0), rest)
