@@ -195,3 +195,13 @@ def test_twice_the_force_is_tried_with_twice_the_amplitudes() -> None:
 )
 def test_a_technician_is_told_the_component(held: Term, place: str) -> None:
     assert place_of(held.effect) == place
+
+
+@pytest.mark.parametrize("zero", [0.0, 1.5])
+def test_a_spring_is_looked_for_where_the_axis_is_however_far_off_its_sensor_counts_from(zero: float) -> None:
+    """Relaxed 1.4 m off a travel of 0.4 m, any spring would be a constant force within a seventh."""
+    scales = replace(SCALES, low=SCALES.low + zero, high=SCALES.high + zero)
+    for effect_id in ("stiffness", "nonlinear_stiffness"):
+        offers = [each for each in candidates(NOMINAL, scales) if each.effect.id == effect_id]
+        places = {trial.by_name["position"] for offer in offers for trial in offer.trials}
+        assert sorted(places) == pytest.approx([0.0 if zero == 0.0 else 1.6])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fric.diagnosis.at_once import helped
+from fric.diagnosis.exchange import exchanged_at
 from fric.diagnosis.fitting import free_names, left_beside, refit, unseen, without_term
 from fric.diagnosis.growth import Growth
 from fric.diagnosis.track import Track
@@ -89,3 +90,16 @@ def test_what_is_led_otherwise_counts_alike() -> None:
     # Bristles without a level carry no force: both are the same model, led in two ways.
     assert pushed.left > 1.05 * put.left
     assert left_beside(track, pushed, True) == pytest.approx(put.left, rel=0.05)
+
+
+def test_a_term_by_another_law_is_found_where_the_order_of_terms_puts_it() -> None:
+    """What depends on the direction stands behind what lags, so that another law changes the places of terms."""
+    model = NOMINAL.with_terms(
+        [*NOMINAL.terms, term("stribeck", force=5.0, velocity=0.01), term("frictional_lag", law="first_order", time=0.01)]
+    )
+    place = [held.effect.id for held in model.terms].index("stribeck")
+    directional = term("stribeck", law="directional", force=5.0, difference=3.0, velocity=0.01)
+    other, now = exchanged_at(model, place, directional)
+    assert now != place
+    assert other.terms[now] is directional
+    assert sorted(held.effect.id for held in other.terms) == sorted(held.effect.id for held in model.terms)

@@ -30,7 +30,6 @@ __all__ = [
     "begun",
     "best_track",
     "bounds_of",
-    "exchanged_at",
     "free_names",
     "is_driven",
     "left_beside",
@@ -386,12 +385,6 @@ def without_place(model: Model, place: int) -> Model:
     if sum(held.effect.id == effect for held in model.terms) == 1:
         return without_term(model, effect)
     return model.with_terms(held for k, held in enumerate(model.terms) if k != place)
-
-
-def exchanged_at(model: Model, place: int, term: Term) -> tuple[Model, int]:
-    """``model`` with ``term`` for its term number ``place``, and the number that it has: terms are kept in an order."""
-    other = model.with_terms(term if k == place else held for k, held in enumerate(model.terms))
-    return other, next(k for k, held in enumerate(other.terms) if held is term)
 
 
 def added(before: Model, after: Model) -> list[int]:

@@ -13,7 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from .candidates import scales_of
-from .fitting import State, exchanged_at, refit
+from .exchange import exchanged_at
+from .fitting import State, refit
 from .other_laws import laws_in_place, told
 from .settle import Step
 from .track import Track

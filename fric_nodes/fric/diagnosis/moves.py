@@ -20,7 +20,8 @@ from .along import Along
 from .candidates import Candidate, candidates, scales_of
 from .costs import NATS_PER_PARAMETER
 from .deadline import is_over
-from .fitting import NOTHING, State, begun, bounds_of, exchanged_at, free_names, left_beside, refit, without_place
+from .exchange import exchanged_at
+from .fitting import NOTHING, State, begun, bounds_of, free_names, left_beside, refit, without_place
 from .motor_side import all_on_load, half_on_motor
 from .other_laws import laws_in_place, told
 from .price import implausible

@@ -12,7 +12,8 @@ from dataclasses import replace
 from ..effect import Effect
 from ..model import Term
 from .candidates import Scales
-from .fitting import State, bounds_of, exchanged_at, free_names
+from .exchange import exchanged_at
+from .fitting import State, bounds_of, free_names
 from .other_laws import laws_beside, laws_further, told
 from .price import OF_FLOOR, price_of
 from .rival import Rival, rival_of

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ...identification.equations import nominal_conditions
 from ...instrument import inspect
@@ -20,8 +21,8 @@ from ...signals.stamps import evened
 from ..candidates import scales_of
 from ..fitting import bounds_of, free_names
 from ..intake import of_use, without_faults
+from ..least_squares import limits_of
 from ..result import Diagnosis
-from ..screen import OWN
 from ..start import lateness
 from ..track import Track
 from .injection import injected
@@ -29,6 +30,7 @@ from .injection import injected
 __all__ = ["Measure", "Yardstick"]
 
 _ACTS = 0.05  # of its largest value: where less is missing the effect does not act
+_TAKEN_UP = 0.1  # of itself: what leaves less, less than motion and its turns are known to, is taken up
 _LITTLE = 0.01  # of the force of friction: an added force so small that it changes nothing but in proportion
 
 
@@ -69,10 +71,15 @@ class Yardstick:
         late = lateness(self.records, bare.refit)
         self._late, self._bandwidth = late, bare.bandwidth
         track = self._track(self.records)
-        fit = track.fit(bare.refit, free_names(bare.refit), 1, bounds_of(bare.refit, scales_of(track)))
-        columns = fit.jacobian[:, fit.solution.free]
-        self._taken_up, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
-        self._lacking = track.residual(bare.refit)
+        names, bounds = free_names(bare.refit), bounds_of(bare.refit, scales_of(track))
+        fit = track.fit(bare.refit, names, 1, bounds)
+        size = np.maximum(np.linalg.norm(fit.jacobian, axis=0), 1e-300)
+        self._columns = fit.jacobian / size
+        # A parameter at its bound takes up what moves it inwards.
+        point = np.array([fit.model.value(name) for name in names]) / fit.scale
+        lower, upper = limits_of(fit.model, names, fit.scale, bounds)
+        self._free = np.where(point > lower, -np.inf, 0.0), np.where(point < upper, np.inf, np.nextafter(0.0, 1.0))
+        self._lacking = fit.residual
         self._stays = track.residual(bare.model)
         self._little = _LITTLE * scales_of(track).level
 
@@ -84,8 +91,8 @@ class Yardstick:
         """What a little of ``effect`` leaves missing, per newton that it was made large [1], shape ``(n,)``."""
         changed = injected(self.records, effect, self._little)
         added = (self._track(changed).residual(self._nominal) - self._lacking) / self._little
-        left = added - self._taken_up @ (self._taken_up.T @ added)
-        return left if np.linalg.norm(left) > OWN * np.linalg.norm(added) else np.zeros_like(left)
+        left = added + self._columns @ lsq_linear(self._columns, -added, self._free).x
+        return left if np.linalg.norm(left) > _TAKEN_UP * np.linalg.norm(added) else np.zeros_like(left)
 
     def measure(self, effect: str) -> Measure:
         """How large ``effect`` has to be."""
