@@ -42,10 +42,10 @@ def lacking(record: Record, bandwidth: float) -> np.ndarray:
     return track.fit(NOMINAL, free_names(NOMINAL), 30, bounds_of(NOMINAL, scales_of(track))).residual
 
 
-@pytest.mark.parametrize("effect", ["quadratic_drag", "stiffness", "ripple", "shear_thinning", "actuator_lag"])
+@pytest.mark.parametrize("effect", ["quadratic_drag", "stiffness", "ripple", "shear_thinning", "actuator_lag", "gear_friction"])
 def test_the_size_said_leaves_so_much_missing_beside_the_refitted_model(restless: Record, bare: Diagnosis, effect: str) -> None:
-    measure = Yardstick([restless], bare).measure(effect)
-    (changed,) = injected([restless], effect, measure.size(10.0) - measure.opposite)
+    measure = Yardstick([restless], bare).measure(effect, 10.0)
+    (changed,) = injected([restless], effect, measure.size - measure.opposite)
     now, before = lacking(changed, bare.bandwidth), lacking(restless, bare.bandwidth)
     acts = np.abs(now - before) > 0.05 * np.max(np.abs(now - before))
     rest = float(np.sqrt(np.mean(before[acts] ** 2)))
@@ -55,11 +55,11 @@ def test_the_size_said_leaves_so_much_missing_beside_the_refitted_model(restless
 def test_what_the_nominal_model_has_a_parameter_for_can_not_show(restless: Record) -> None:
     nominal = NOMINAL.with_terms([*NOMINAL.terms, term("quadratic_drag", coefficient=1.0)])
     yardstick = Yardstick([restless], told(restless, nominal))
-    assert np.isinf(yardstick.measure("quadratic_drag").size(1.0))
-    assert np.isfinite(yardstick.measure("stiffness").size(1.0))
+    assert np.isinf(yardstick.measure("quadratic_drag", 1.0).size)
+    assert np.isfinite(yardstick.measure("stiffness", 1.0).size)
 
 
 def test_the_opposite_that_the_axis_lacks_is_made_up_for(restless: Record) -> None:
     (softer,) = injected([restless], "stiffness", -2.0)
-    measure = Yardstick([softer], told(softer, NOMINAL)).measure("stiffness")
+    measure = Yardstick([softer], told(softer, NOMINAL)).measure("stiffness", 1.0)
     assert measure.opposite == pytest.approx(2.0, rel=0.15)

@@ -153,13 +153,16 @@ def grown_on(tracks: Sequence[Track], start: Growth, tell: Callable[[str], None]
     return growth
 
 
-def settled_again(growth: Growth) -> Growth:
-    """``growth`` without the terms that do not earn their place; those that stay have been compared with their rivals."""
+def settled_again(growth: Growth, exchange: bool = True) -> Growth:
+    """``growth`` without the terms that do not earn their place.
+
+    Those that stay are held against their rivals if they may be ``exchange``d, else the caller does that.
+    """
     done = settled(growth.track, growth.begin, growth.end, list(growth.steps))
     gone = (*growth.rejected, *done.gone)
     held = replace(growth, begin=done.begin, end=done.state, steps=done.steps, rest=done.rest, rejected=gone)
     # What halves contradict each other about goes first: none of its rivals has to be fitted then.
-    return _exchanged(reproduced(held))
+    return _exchanged(reproduced(held)) if exchange else reproduced(held)
 
 
 def _exchanged(growth: Growth) -> Growth:

@@ -53,11 +53,13 @@ class Evidence:
 def measures_of(evidence: Evidence) -> dict[str, float]:
     """The measures that enter the odds, by name; each counts for the effect, the more the larger it is.
 
-    How much stays unexplained is no measure, beyond whether the effects are an explanation: it hardly told right from wrong in
-    examinations beside the others. Halves or functions that speak against an effect count against it.
+    What stays unexplained counts as that beside which an effect explains: a tenth of it may be any law's, and ten times as much
+    is hardly what something unknown looks like. Halves or functions that speak against an effect count against it.
     """
+    share, rest = (min(max(each, _LEAST), 1.0) for each in (evidence.share, evidence.rest))
     return {
-        "share": math.log(min(max(evidence.share, _LEAST), 1.0)),
+        "share": math.log(share),
+        "beside rest": math.log(share / rest),
         "halves": _signed(evidence.halves),
         "functions": _signed(evidence.functions),
         "rivals": math.log(min(max(evidence.rivals, _LEAST), 1.0)),

@@ -116,7 +116,8 @@ def with_moves(growth: Growth, tell: Callable[[str], None]) -> Growth:
         more = extended_by_terms([moved.track], moved, None, tell, most=len(moved.steps) + _TO_COMPARE)
         if len(more.steps) == len(moved.steps):
             break
-        growth = settled_again(more)
+        # The term that has come was the best of its rivals, and the moves exchange what looks alike.
+        growth = settled_again(more, exchange=False)
         if not growth.steps or growth.rest >= moved.rest:
             break
     # Of terms that have come together, or in the place of others, none has been compared.

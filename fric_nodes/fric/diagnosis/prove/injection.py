@@ -22,6 +22,7 @@ from ...record import Array, Record
 __all__ = ["CHANGED", "INJECTED", "Injected", "injected", "injections"]
 
 _CUTOFF = 40.0  # physical [Hz]: where axes' friction changes with their motion
+_TOLD = 0.1  # numerical, of the sampling rate: what is faster isn't told from noise
 _REST = 0.01  # physical, of fast motion: below, the axis may rest, where friction balances whatever is left
 _FAST = 0.98  # statistical: quantile of the speed that is fast motion
 _ACTS = 0.05  # of its largest value: where an added force is less it does not act
@@ -60,35 +61,34 @@ INJECTED: dict[str, Callable[[Motion], Array]] = {
 """Forces along the motion, of the size of one, by the effect of the vocabulary that they are."""
 
 
+def _slope(force: Array, motion: Motion) -> Array:
+    """What changes per second of delay or lag [F/s]."""
+    return np.asarray(np.gradient(force, motion.time), dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class Changed:
     """An effect that changes the effort itself.
 
     Attributes:
-        slope: what a small one adds, of the size of one [F], from the recording and its motion, shape ``(n,)``.
-        effort: the whole effort with one of the given size [F], shape ``(n,)``.
+        slope: what a small one adds, of the size of one [F], to a force without noise and with the motion, shape ``(n,)``.
+        force: the whole force with one of the given size [F], shape ``(n,)``.
     """
 
-    slope: Callable[[Record, Motion], Array]
-    effort: Callable[[Record, Motion, float], Array]
-
-
-def _later(record: Record, motion: Motion) -> Array:
-    """What changes per second of delay or lag [F/s]."""
-    return np.asarray(np.gradient(record.effort, record.time), dtype=np.float64)
-
-
-def _geared(record: Record, motion: Motion, size: float) -> Array:
-    """The effort of which friction of ``size`` times itself leaves the recorded one."""
-    return record.effort / (1.0 - size * motion.sign * np.sign(record.effort))
+    slope: Callable[[Array, Motion], Array]
+    force: Callable[[Array, Motion, float], Array]
 
 
 CHANGED: dict[str, Changed] = {
-    "delay": Changed(_later, lambda record, motion, size: np.interp(record.time + size, record.time, record.effort)),
-    "actuator_lag": Changed(_later, lambda record, motion, size: record.effort + size * _later(record, motion)),
-    "gear_friction": Changed(lambda record, motion: np.abs(record.effort) * motion.sign, _geared),
+    "delay": Changed(_slope, lambda force, motion, size: np.interp(motion.time + size, motion.time, force)),
+    "actuator_lag": Changed(_slope, lambda force, motion, size: force + size * _slope(force, motion)),
+    "gear_friction": Changed(
+        lambda force, motion: np.abs(force) * motion.sign,
+        # The effort of which friction of ``size`` times itself leaves the recorded one.
+        lambda force, motion, size: force / (1.0 - size * motion.sign * np.sign(force)),
+    ),
 }
-"""Those that are no force along the motion."""
+"""Those that are no force along the motion. The sensor's noise passes through none of them, and stays as it is."""
 
 
 @dataclass(frozen=True)
@@ -127,14 +127,24 @@ def injected(records: Sequence[Record], effect: str, size: float) -> list[Record
         sign = np.where(np.abs(each.velocity) > _REST * fast, np.sign(each.velocity), 0.0)
         motion = replace(each, sign=sign, fast=fast, low=low, high=high)
         moved.append(motion)
-        made.append(INJECTED[effect](motion) if changing is None else changing.slope(record, motion))
+        made.append(INJECTED[effect](motion) if changing is None else changing.slope(_without_noise(record), motion))
     joined = np.concatenate(made)
     acts = np.abs(joined) > _ACTS * float(np.max(np.abs(joined)))
     scale = size / float(np.sqrt(np.mean(joined[acts] ** 2)))
-    return [
-        replace(record, effort=record.effort + scale * force if changing is None else changing.effort(record, motion, scale))
-        for record, motion, force in zip(records, moved, made, strict=True)
-    ]
+    added = []
+    for record, motion, force in zip(records, moved, made, strict=True):
+        if changing is None:
+            added.append(scale * force)
+        else:
+            plain = _without_noise(record)
+            added.append(changing.force(plain, motion, scale) - plain)
+    return [replace(record, effort=record.effort + each) for record, each in zip(records, added, strict=True)]
+
+
+def _without_noise(record: Record) -> Array:
+    """The effort, low-passed without delay where samples tell noise from it [F]."""
+    cutoff = min(_CUTOFF, _TOLD / record.sample_time)
+    return np.asarray(sosfiltfilt(butter(2, cutoff, fs=1.0 / record.sample_time, output="sos"), record.effort))
 
 
 def _motion(record: Record) -> Motion:

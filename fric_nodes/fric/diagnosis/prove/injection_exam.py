@@ -13,8 +13,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...errors import InputError
 from ...files import write_text
 from ...model import Model
@@ -45,8 +43,8 @@ class InjectionOutcome:
         rms: root mean square of the added force where it acts [F].
         rest: that of what stays unexplained there in the recordings as they are [F].
         presence: of the injected effect; 0 where it isn't named.
-        wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor named so in the
-            recordings as they are.
+        wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor named in the recordings
+            as they are, however surely: what is named there may be the axis's own.
         failure: why there is no diagnosis; empty where there is one.
     """
 
@@ -100,15 +98,13 @@ def examined(
     own = {each.effect: each.confidence for each in reversed(bare.findings)}
     waiting = [what for what in wanted if not _at(out, what).exists()]
     yardstick = Yardstick(records, bare)
-    measures = {effect: yardstick.measure(effect) for effect in dict.fromkeys(what.effect for what in waiting)}
-    most = float(np.sqrt(np.mean(np.concatenate([each.effort for each in records]) ** 2)))
     tasks: list[tuple[object, ...]] = []
     for what in waiting:
-        rest, size = measures[what.effect].rest, measures[what.effect].size(what.times)
-        if size > most:
-            _write(out, what, 0.0, rest, own, CANNOT_SHOW, ())
+        measured = yardstick.measure(what.effect, what.times)
+        if math.isinf(measured.size):
+            _write(out, what, 0.0, measured.rest, own, CANNOT_SHOW, ())
         else:
-            tasks.append((str(out), what, records, nominal, size, rest, n_blocks, own, at_most))
+            tasks.append((str(out), what, records, nominal, measured.size, measured.rest, n_blocks, own, at_most))
     in_processes(_diagnosed, tasks, progress, "diagnosed", jobs)
     return bare, [_outcome(json.loads(_at(out, what).read_text(encoding="utf-8"))) for what in wanted]
 
@@ -189,6 +185,6 @@ def _said(finding: Finding) -> dict[str, Any]:
 def _outcome(told: dict[str, Any]) -> InjectionOutcome:
     what = Injected(**told["injected"])
     sure = {each["effect"]: each["confidence"] for each in reversed(told["findings"])}
-    own = {effect for effect, confidence in told["own"].items() if confidence >= AS_LIKELY}
-    wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in {what.effect, "unknown", *own})
+    own = {what.effect, "unknown", *told["own"]}
+    wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in own)
     return InjectionOutcome(what, told["rms"], told["rest"], sure.get(what.effect, 0.0), tuple(sorted(wrong)), told["failure"])

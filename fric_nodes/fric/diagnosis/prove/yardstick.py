@@ -31,27 +31,23 @@ __all__ = ["Measure", "Yardstick"]
 
 _ACTS = 0.05  # of its largest value: where less is missing the effect does not act
 _TAKEN_UP = 0.1  # of itself: what leaves less, less than motion and its turns are known to, is taken up
+_STEPS = 4  # numerical: towards the size
 _LITTLE = 0.01  # of the force of friction: an added force so small that it changes nothing but in proportion
 
 
 @dataclass(frozen=True)
 class Measure:
-    """How large an effect has to be.
+    """How large an effect is made.
 
     Attributes:
-        unit: root mean square of the added force that leaves missing as much as stays unexplained where it acts [F]; infinite
-            where the parameters of the nominal model take up all of it.
-        opposite: that makes up for the opposite that the axis itself lacks [F].
+        size: root mean square of the added force [F]; infinite where the parameters of the nominal model take it up.
+        opposite: part of it that makes up for the opposite that the axis itself lacks [F].
         rest: root mean square of what stays unexplained where the effect acts [F].
     """
 
-    unit: float
+    size: float
     opposite: float
     rest: float
-
-    def size(self, times: float) -> float:
-        """Of an effect that leaves ``times`` as much missing as stays unexplained anyway [F]."""
-        return self.opposite + times * self.unit
 
 
 class Yardstick:
@@ -60,6 +56,10 @@ class Yardstick:
     Args:
         records: of one axis.
         bare: their diagnosis; what its model leaves is what stays unexplained.
+
+    Attributes:
+        records: as they are diagnosed, without what can't be used.
+        most: root mean square of their effort [F]; an effect that would have to be larger isn't concealed.
     """
 
     def __init__(self, records: Sequence[Record], bare: Diagnosis) -> None:
@@ -81,26 +81,35 @@ class Yardstick:
         self._free = np.where(point > lower, -np.inf, 0.0), np.where(point < upper, np.inf, np.nextafter(0.0, 1.0))
         self._lacking = fit.residual
         self._stays = track.residual(bare.model)
+        self.most = float(np.sqrt(np.mean(np.concatenate([each.effort for each in self.records]) ** 2)))
         self._little = _LITTLE * scales_of(track).level
 
     def _track(self, records: Sequence[Record]) -> Track:
         track = Track.of(records, self._bandwidth, self._nominal, self._late)
         return replace(track, mass=self._nominal.total_inertia)
 
-    def missing(self, effect: str) -> Array:
-        """What a little of ``effect`` leaves missing, per newton that it was made large [1], shape ``(n,)``."""
-        changed = injected(self.records, effect, self._little)
-        added = (self._track(changed).residual(self._nominal) - self._lacking) / self._little
-        left = added + self._columns @ lsq_linear(self._columns, -added, self._free).x
-        return left if np.linalg.norm(left) > _TAKEN_UP * np.linalg.norm(added) else np.zeros_like(left)
-
-    def measure(self, effect: str) -> Measure:
-        """How large ``effect`` has to be."""
-        missing = self.missing(effect)
+    def measure(self, effect: str, times: float) -> Measure:
+        """How large ``effect`` has to be to leave ``times`` as much missing as stays unexplained where it acts."""
+        size = self._little
+        missing = self._missing(effect, size)
         most = float(np.max(np.abs(missing)))
         if most == 0.0:
             return Measure(np.inf, 0.0, 0.0)
         acts = np.abs(missing) > _ACTS * most
         rest = float(np.sqrt(np.mean(self._stays[acts] ** 2)))
-        along = float(self._lacking @ missing) / float(missing @ missing)
-        return Measure(rest / float(np.sqrt(np.mean(missing[acts] ** 2))), max(-along, 0.0), rest)
+        opposite = max(-float(self._lacking @ missing) / float(missing @ missing) * size, 0.0)
+        for _ in range(_STEPS):
+            # What changes the effort itself isn't in proportion to its size.
+            leaves = float(np.sqrt(np.mean(missing[acts] ** 2)))
+            size *= times * rest / max(leaves, 1e-300)
+            if not size + opposite < self.most:
+                return Measure(np.inf, opposite, rest)
+            missing = self._missing(effect, size)
+        return Measure(size + opposite, opposite, rest)
+
+    def _missing(self, effect: str, size: float) -> Array:
+        """What ``effect`` of that ``size`` leaves missing [F], shape ``(n,)``; nothing where the model takes up all of it."""
+        changed = injected(self.records, effect, size)
+        added = self._track(changed).residual(self._nominal) - self._lacking
+        left = added + self._columns @ lsq_linear(self._columns, -added, self._free).x
+        return left if np.linalg.norm(left) > _TAKEN_UP * np.linalg.norm(added) else np.zeros_like(left)
