@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from fric.diagnosis import conclusion
 from fric.diagnosis.diagnose import diagnose
 from fric.diagnosis.faint import faint_term
 from fric.diagnosis.fitting import refit
+from fric.diagnosis.growth import Growth
+from fric.diagnosis.presence import Presence, presences
 from fric.diagnosis.prove.cases import draw
 from fric.diagnosis.track import Track
 from fric.model import Term, term
@@ -61,3 +65,23 @@ def test_where_the_force_between_samples_is_unsure_nothing_faint_is_told() -> No
     unsure = [replace(track, runs=runs) for track, runs in zip(followed, wide, strict=True)]
     assert all(track.unsure for track in unsure)
     assert faint_term(unsure, NOMINAL, quietly) is None
+
+
+@pytest.mark.parametrize("probability", [0.3, 0.7])
+def test_hardly_more_than_noise_is_a_mismatch_where_an_effect_is_likelier_there_than_not(
+    probability: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def less_sure(*args: Any, **kwargs: Any) -> dict[str, Presence]:
+        return {name: replace(each, probability=probability) for name, each in presences(*args, **kwargs).items()}
+
+    monkeypatch.setattr(conclusion, "presences", less_sure)
+    monkeypatch.setattr(Growth, "stands_out", property(lambda growth: growth.begin.excess > 3.0 * growth.begin.floor))
+    faint = term("ripple", cosine=0.5, sine=0.0, period=0.03)
+    learnt, held_back = (recorded(faint, seed=seed, duration=8.0, noise=NOISE) for seed in (0, 1))
+    found = diagnose([learnt], [held_back], NOMINAL)
+    likely = probability > 0.5
+    assert found.mismatch == likely
+    assert [each.effect for each in found.findings] == (["ripple"] if likely else [])
+    assert ("hardly more than noise" in " ".join(each.why for each in found.rejected)) == (not likely)
+    names = {held.effect.id for held in found.model.terms}
+    assert ("ripple" in names) == likely

@@ -12,7 +12,7 @@ from ..model import Model, Term
 from ..record import Array, Record
 from .candidates import Scales, scales_of
 from .component import Signature
-from .confidence import LITTLE_LEFT, MANY, is_doubtful
+from .confidence import AS_LIKELY, LITTLE_LEFT, MANY, is_doubtful
 from .findings import (
     finding_of,
     next_experiment,
@@ -168,10 +168,11 @@ def concluded(
     seen = _judged(validation, whole, nominal, growth)
     fast = locating(validation, seen.held, seen.growth)
     seen, findings, doubts = _explained(seen, fast, searched)
-    growth, held, scales = seen.growth, seen.held, scales_of(seen.held)
+    held, scales = seen.held, scales_of(seen.held)
     alone = None if seen.learnt or not seen.told else only_there(train, validation, held, seen.begin.model)
     unknown, unexplained, remains = _rest(seen, doubts, alone, findings, scales)
-    findings = _surely(seen, unexplained, unknown, findings)
+    seen, findings = _likely(seen, _surely(seen, unexplained, unknown, findings))
+    growth = seen.growth
     everything = None if alone is None else unexplained.where
     if seen.missing:
         energy = difference_of(fast, seen.begin.model, seen.end)
@@ -217,7 +218,7 @@ def _explained(seen: _Judged, fast: Track, searched: Sequence[Track]) -> tuple[_
     findings.sort(key=lambda each: -each.confidence * each.share)
     doubts = _doubts(seen, searched, findings)
     if doubts.unknown and only_noise(seen.track, seen.begin.model):
-        seen = _without_noise(seen)
+        seen = replace(_nothing(seen, "what it explains doesn't go with the motion"), noise=True)
         return seen, [], _doubts(seen, searched, [])
     return seen, findings, doubts
 
@@ -250,7 +251,11 @@ def _surely(seen: _Judged, unexplained: Unexplained, unknown: Finding | None, fi
     """``findings`` with how sure each is there, whatever stays unexplained; behind what is ``unknown``, if anything is."""
     shares = {each.term: each.share for each in findings}
     steps = seen.growth.steps
-    present = presences(seen.track, seen.end, steps, shares, min(unexplained.share, 1.0), unknown is None)
+    # What stays is known no better than the floor below it: where hardly more than that is missing, anything may explain it.
+    floor = seen.scored.noise_floor
+    unsure = FLOOR_KNOWN * floor / max(seen.scored.noe_refit - floor, 1e-300)
+    stays = min(max(unexplained.share, unsure), 1.0)
+    present = presences(seen.track, seen.end, steps, shares, stays, unknown is None)
     told = with_presences(present, findings)
     # Beside something unknown, what takes most off comes first.
     return told if unknown is None else [unknown, *sorted(told, key=lambda each: -each.share)]
@@ -289,14 +294,21 @@ def _judged(validation: Sequence[Record], whole: Sequence[Track], nominal: Model
     return _Judged(growth, held, track, begin, end, left, floor, scored, told, learnt, missing, seen_rest)
 
 
-def _without_noise(seen: _Judged) -> _Judged:
-    """The verdict ``seen`` where what the nominal model lacks is noise: nothing is missing, and no effect explains it."""
+def _likely(seen: _Judged, findings: list[Finding]) -> tuple[_Judged, list[Finding]]:
+    """The verdict and its findings; nothing is missing where that is hardly more than noise and no effect is likely there."""
+    if seen.growth.stands_out or not findings or any(f.effect == "unknown" or f.confidence >= AS_LIKELY for f in findings):
+        return seen, findings
+    return _nothing(seen, "is less likely there than not, and hardly more than noise is missing"), []
+
+
+def _nothing(seen: _Judged, why: str) -> _Judged:
+    """The verdict ``seen`` with nothing missing and no effect; ``why`` those that came are none."""
     growth, noe = seen.growth, seen.scored.noe_refit
-    gone = tuple((step.term.split("#")[0], "what it explains doesn't go with the motion") for step in growth.steps)
+    gone = tuple((step.term.split("#")[0], why) for step in growth.steps)
     growth = replace(growth, end=growth.begin, steps=(), rejected=(*growth.rejected, *gone), beyond=0.0)
     left = {**seen.left, "augmented": seen.left["refit"]}
     scored = replace(seen.scored, noe_augmented=noe)
-    return replace(seen, growth=growth, end=seen.begin.model, left=left, scored=scored, missing=False, noise=True)
+    return replace(seen, growth=growth, end=seen.begin.model, left=left, scored=scored, missing=False)
 
 
 def _doubts(seen: _Judged, searched: Sequence[Track], findings: Sequence[Finding]) -> _Doubts:
