@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fric.diagnosis import settle
 from fric.diagnosis.fitting import State, refit
 from fric.diagnosis.settle import Settled, Step, audit, exchanged, is_nothing, merged, renamed, settled
 from fric.diagnosis.track import Track
@@ -77,6 +78,22 @@ def test_what_makes_worse_what_it_was_not_fitted_to_goes() -> None:
     assert done.rest == 1.0
     assert done.state.fit.model.prefixes == NOMINAL.prefixes
     assert [name for name, _ in done.gone] == ["ripple"]
+
+
+def test_terms_that_stay_but_make_worse_what_they_were_not_fitted_to_are_no_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What has gone is tried in their place, once: steps that only got another name haven't gone."""
+    audited = list[tuple[str, ...]]()
+
+    def worse(track: Track, begin: Model, end: Model) -> float:
+        audited.append(end.prefixes[len(NOMINAL.prefixes) :])
+        return 2.0
+
+    monkeypatch.setattr(settle, "audit", worse)
+    track, begin, state = begun(DRAG, grown=(DRAG, SPRING))
+    done = settled(track, begin, state, steps_for(begin, state, "quadratic_drag", "stiffness"))
+    assert audited == [("quadratic_drag",), ("stiffness",)]
+    assert (done.steps, done.rest, done.state) == ((), 1.0, done.begin)
+    assert {name for name, _ in done.gone} == {"quadratic_drag", "stiffness"}
 
 
 def test_a_single_term_is_not_compared_again() -> None:

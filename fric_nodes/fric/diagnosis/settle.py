@@ -107,14 +107,14 @@ def settled(track: Track, begin: State, state: State, steps: list[Step]) -> Sett
     begin = refit(track, begin.fit.model, max_iterations=6)
     pruned, kept, gone = _pruned(track, begin, state, steps)
     rest = audit(track, begin.fit.model, pruned.fit.model) if kept else 1.0
-    back = [step for step in steps if step not in kept]
+    back = [step for step, _ in gone]
     if rest > 1.0 and back:
         culprits = {step.term.split("#")[0] for step in kept}
         honest = [held for held in state.fit.model.terms if held.effect.id not in culprits]
         done = settled(track, begin, refit(track, state.fit.model.with_terms(honest)), back)
         worse = [(step.term.split("#")[0], _WORSE) for step in kept]
         return replace(done, gone=(*worse, *done.gone))
-    return _unless_worse(Settled(begin, pruned, tuple(kept), rest, tuple(gone)))
+    return _unless_worse(Settled(begin, pruned, tuple(kept), rest, _by_effect(gone)))
 
 
 def exchanged(track: Track, done: Settled) -> Settled:
@@ -124,7 +124,7 @@ def exchanged(track: Track, done: Settled) -> Settled:
     state, steps = _exchanged(track, done.begin, done.state, list(done.steps), scales_of(track))
     state, steps, gone = _pruned(track, done.begin, state, steps)
     rest = audit(track, done.begin.fit.model, state.fit.model)
-    return _unless_worse(Settled(done.begin, state, tuple(steps), rest, (*done.gone, *gone)))
+    return _unless_worse(Settled(done.begin, state, tuple(steps), rest, (*done.gone, *_by_effect(gone))))
 
 
 def compared(track: Track, begin: State, state: State, steps: Sequence[Step]) -> tuple[Step, ...]:
@@ -303,12 +303,19 @@ def is_nothing(held: Term) -> bool:
     )
 
 
-def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step], list[tuple[str, str]]]:
+def _by_effect(gone: Sequence[tuple[Step, str]]) -> tuple[tuple[str, str], ...]:
+    """The effects of steps that went, with the reason."""
+    return tuple((step.term.split("#")[0], why) for step, why in gone)
+
+
+def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tuple[State, list[Step], list[tuple[Step, str]]]:
     """Terms taken away again, everything else fitted anew, while hardly anything is lost: first the one that is missed least.
+
+    The steps that went come last, with the reason.
 
     Of two that do the same work either could go, but not both.
     """
-    gone: list[tuple[str, str]] = []
+    gone: list[tuple[Step, str]] = []
     while len(steps) > 1:
         left_out: list[tuple[float, State, Step, str]] = []
         model = state.fit.model
@@ -331,5 +338,5 @@ def _pruned(track: Track, begin: State, state: State, steps: list[Step]) -> tupl
         _, state, least, why = min(left_out, key=lambda each: each[0])
         place = model.prefixes.index(least.term)
         steps = [renamed(each, model, place) for each in steps if each is not least]
-        gone.append((least.term.split("#")[0], why))
+        gone.append((least, why))
     return state, steps, gone
