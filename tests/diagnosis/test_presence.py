@@ -91,7 +91,7 @@ def test_what_stays_unexplained_never_makes_surer(found: dict[str, Presence], fi
 
 
 def test_what_only_mends_something_unknown_is_not_sure(found: dict[str, Presence]) -> None:
-    assert found["quadratic_drag"].probability < min(0.3, 0.2 * found["ripple"].probability)
+    assert found["quadratic_drag"].probability < 0.3 * found["ripple"].probability
 
 
 def test_what_halves_contradict_each_other_about_goes(fitted: Fitted) -> None:
