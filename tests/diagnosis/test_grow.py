@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from fric.diagnosis.fitting import State, refit
@@ -17,6 +21,7 @@ from .small_axis import NOMINAL as SMALL
 from .small_axis import followed, with_terms
 
 H = 1e-3
+grow_module = importlib.import_module("fric.diagnosis.grow")
 PLAIN = (term("coulomb", force=5.0), term("viscous", coefficient=20.0))
 NOMINAL = build_model("rigid", {"mass": 2.0}, PLAIN)
 RIPPLE = term("ripple", cosine=2.0, sine=0.0, period=0.05)
@@ -65,3 +70,28 @@ def test_a_move_makes_room_for_what_is_added_then() -> None:
     assert {each.term for each in found.steps} == {"stribeck", "quadratic_drag"}
     assert found.rest < 0.01
     assert found.end.fit.model.value("quadratic_drag.coefficient") == pytest.approx(15.0, rel=0.02)
+
+
+def test_a_beginning_is_judged_without_what_only_mends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With two terms that explain the last per cent, the right beginning would cost more than a wrong one without any."""
+    drag, spring = term("quadratic_drag", coefficient=15.0), term("stiffness", stiffness=0.5)
+    ripple = term("ripple", cosine=0.1, sine=0.0, period=0.04)
+    track = followed(drag)
+    begin = refit(track, SMALL)
+
+    def grown(*names: str, **more: Any) -> Growth:
+        terms = {"quadratic_drag": drag, "stiffness": spring, "ripple": ripple}
+        end = refit(track, with_terms(*(terms[name] for name in names)))
+        steps = tuple(Step(name, begin.left, end.left, end.floor, begin.excess, (), ()) for name in names)
+        return Growth(track, begin, end, steps, (), 1.0, **more)
+
+    other = SimpleNamespace(names=("stiffness",), effect=spring.effect)
+    first = grown("quadratic_drag", "ripple", "stiffness", beginnings=(other,))
+    lacks = {("quadratic_drag", "ripple", "stiffness"): 0.01, ("stiffness",): 0.07, ("quadratic_drag",): 0.02}
+    monkeypatch.setattr(grow_module, "_surely_lacks", lambda each: lacks[tuple(step.term for step in each.steps)])
+    monkeypatch.setattr(grow_module, "extended_by_terms", lambda *_, **__: grown("stiffness", ended=True))
+    monkeypatch.setattr(Growth, "dear", property(lambda each: 0.05 * len(each.steps)))
+    best = grow_module._compared([track], grown(), first, lambda _: None)
+    assert [step.term for step in best.steps] == ["quadratic_drag"]
+    assert best.end.fit.model.prefixes == (*SMALL.prefixes, "quadratic_drag")
+    assert not best.ended

@@ -215,7 +215,19 @@ def _compared(tracks: Sequence[Track], start: Growth, first: Growth, tell: Calla
         tell(f"once more, from {' and '.join(other.names)}")
         grown = extended_by_terms(tracks, start, other, tell, most=_TO_COMPARE)
         tried.append((grown, _surely_lacks(grown)))
-    return best_of_all()[0]
+    best, lacks = best_of_all()
+    # What mends the last of it may cost a beginning more than it gains.
+    plain = [_first_alone(each) for each, _ in tried if each is not best and len(each.steps) > 1]
+    judged = [(best, lacks), *((each, _surely_lacks(each)) for each in plain)]
+    return min(judged, key=lambda each: each[1] + each[0].dear)[0]
+
+
+def _first_alone(growth: Growth) -> Growth:
+    """``growth`` with its first term only."""
+    gone = {step.term for step in growth.steps[1:]}
+    model = growth.end.fit.model
+    first = model.with_terms(held for name, held in zip(model.prefixes, model.terms, strict=True) if name not in gone)
+    return replace(growth, end=refit(growth.track, first), steps=growth.steps[:1], ended=False)
 
 
 def _surely_lacks(growth: Growth) -> float:
