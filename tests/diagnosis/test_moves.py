@@ -49,6 +49,17 @@ def test_a_move_that_lost_by_more_than_others_have_won_since_is_not_made_again()
         assert search.is_worth(("without", "quadratic_drag")) is again
 
 
+@pytest.mark.parametrize("difference", [0.0, 3.0])
+def test_a_form_gives_way_to_its_law_where_it_has_nothing_more(difference: float) -> None:
+    """A Stribeck effect that is the same both ways, by the law for one that differs; and one that does differ."""
+    form = term("stribeck", "directional", force=6.0, difference=difference, velocity=0.15)
+    track, begin, state = begun(form, grown=(term("stribeck", "directional", force=6.0, difference=0.1, velocity=0.15),))
+    found, _ = moves(track, begin, state)
+    (held,) = (held for held in found.fit.model.terms if held.effect.id == "stribeck")
+    assert held.effect.law == ("directional" if difference else "exponential")
+    assert held.by_name["force"] == pytest.approx(6.0, rel=0.05)
+
+
 def test_the_right_structure_is_not_moved() -> None:
     track, begin, state = begun(DRAG, grown=(DRAG,))
     found, said = moves(track, begin, state)

@@ -18,7 +18,7 @@ from ..effect import Effect
 from ..model import Model, Term
 from .along import Along
 from .candidates import Candidate, candidates, scales_of
-from .costs import NATS_PER_PARAMETER
+from .costs import NATS_PER_PARAMETER, law_of_form
 from .deadline import is_over
 from .exchange import exchanged_at
 from .fitting import NOTHING, State, begun, bounds_of, free_names, left_beside, refit, without_place
@@ -176,6 +176,18 @@ class Search:
         fewer = [(f"{what}, {which}", state) for what, k, whole in made[:_LAWS] for which, state in self.without_each(whole, k)]
         return [*((what, state) for what, _, state in made), *fewer]
 
+    def simpler_laws(self) -> list[tuple[str, State]]:
+        """Each term by the law that its own is a form of: beside the others, what the form has more may be nothing."""
+        model = self.state.fit.model
+        made = []
+        for k in self.brought:
+            held, law = model.terms[k], law_of_form(model.terms[k].effect)
+            move = ("by the simpler law", model.prefixes[k])
+            if law is not None and self.is_worth(move):
+                other, _ = exchanged_at(model, k, Term(law, tuple(law.values(held.by_name))))
+                made.append((f"{held.effect.title} by a simpler law", self.judged(move, refit(self.track, other))))
+        return made
+
     def mended(self) -> bool:
         """Whether other values or laws of the same effects have become the better ones."""
         return self.taken(self.other_side()) or self.taken(self.elsewhere()) or self.taken(self.other_laws())
@@ -240,7 +252,7 @@ def reconsidered(track: Track, begin: State, state: State, tell: Callable[[str],
     own = frozenset(held.effect.key for held in begin.fit.model.terms)
     search = Search(track, begin, state, own, tell)
     for _ in range(_MOVES):
-        if search.taken(search.without_each(search.state)):
+        if search.taken(search.without_each(search.state)) or search.taken(search.simpler_laws(), same=True):
             continue
         if is_over():
             break
