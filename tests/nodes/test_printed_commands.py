@@ -312,6 +312,8 @@ KNOWN: dict[str, Case] = {
     "fric diagnose bags/torso --blocks 6 --repair --model config/published/torso_nominal.yaml --out diagnosis": _long(
         needs=(_after(_TIAGO),), data=True
     ),
+    "fric prove --inject bags/torso --blocks 6 --repair --model config/published/torso_nominal.yaml --at-most 60 "
+    "--out injected": _long(needs=(_after(_TIAGO),), data=True),
 }
 
 
