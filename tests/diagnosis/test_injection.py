@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import fric
 import numpy as np
 import pytest
+from fric.diagnosis.prove import injection_exam
 from fric.diagnosis.prove.calibrating import trials_of
 from fric.diagnosis.prove.injection import CHANGED, INJECTED, Injected, injected, injections
 from fric.diagnosis.prove.injection_exam import examined
@@ -69,6 +71,12 @@ def test_the_axis_with_the_effect_moves_the_same_under_the_changed_effort(effect
     without = fric.simulate(NOMINAL, changed.effort, period=H)
     off = np.max(np.abs(moved.position - plain.position))
     assert off < 0.1 * np.max(np.abs(without.position - plain.position))
+
+
+def test_recordings_at_one_speed_each_are_refused(record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(injection_exam, "diagnose", lambda *_, **__: SimpleNamespace(by_means=True))
+    with pytest.raises(InputError, match="is at one speed"):
+        examined([record], NOMINAL, [Injected("stiffness", 6.0)], 6, tmp_path, list[str]().append)
 
 
 @pytest.mark.long

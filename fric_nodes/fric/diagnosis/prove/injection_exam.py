@@ -31,6 +31,7 @@ __all__ = ["CANNOT_SHOW", "InjectionOutcome", "examined", "told_in"]
 
 CANNOT_SHOW = "can't show in this motion"
 """Of an effect that the nominal model's own parameters take up, or that would have to be larger than the force itself."""
+_SIZED = "by what it leaves missing"
 _FOLDER = "injected"
 
 
@@ -89,12 +90,15 @@ def examined(
         at_most: time after which a diagnosis looks for no further effects [s]; None: each ends by itself.
 
     Raises:
-        InputError: the folder holds another examination, or ``at_most`` is no time.
+        InputError: the folder holds another examination, ``at_most`` is no time, or every recording is at one speed.
     """
     refuse_no_time(at_most)
     _claim(out, records, nominal, n_blocks, at_most)
     progress("diagnosing the recordings as they are")
     bare = diagnose(*in_blocks(records, n_blocks), nominal, at_most=at_most)
+    if bare.by_means:
+        problem = "is at one speed, as all others are: what is concealed in it would be a friction curve's mean alone"
+        raise InputError(records[0].source, problem, "give recordings whose speed changes")
     own = {each.effect: each.confidence for each in reversed(bare.findings)}
     waiting = [what for what in wanted if not _at(out, what).exists()]
     yardstick = Yardstick(records, bare)
@@ -125,7 +129,7 @@ def _at(out: Path, what: Injected) -> Path:
 def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int, at_most: float | None) -> None:
     """Write down of what it is, or check that the folder holds the same."""
     limit = "" if at_most is None else f" {at_most}"
-    told = hashlib.sha256(f"{model_to_text(nominal)} {n_blocks}{limit}".encode())
+    told = hashlib.sha256(f"{model_to_text(nominal)} {n_blocks}{limit} {_SIZED}".encode())
     for record in records:
         for each in (record.time, record.position, record.effort, record.mask):
             told.update(each.tobytes())

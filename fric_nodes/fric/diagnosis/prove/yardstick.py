@@ -32,6 +32,7 @@ __all__ = ["Measure", "Yardstick"]
 _ACTS = 0.05  # of its largest value: where less is missing the effect does not act
 _TAKEN_UP = 0.1  # of itself: what leaves less, less than motion and its turns are known to, is taken up
 _STEPS = 4  # numerical: towards the size
+_NEAR = 0.2  # numerical, of what is to be left missing: a size that comes no nearer in so many steps isn't one
 _LITTLE = 0.01  # of the force of friction: an added force so small that it changes nothing but in proportion
 
 
@@ -40,7 +41,8 @@ class Measure:
     """How large an effect is made.
 
     Attributes:
-        size: root mean square of the added force [F]; infinite where the parameters of the nominal model take it up.
+        size: root mean square of the added force [F]; infinite where the parameters of the nominal model take it up, or no size
+            leaves as much missing.
         opposite: part of it that makes up for the opposite that the axis itself lacks [F].
         rest: root mean square of what stays unexplained where the effect acts [F].
     """
@@ -105,7 +107,10 @@ class Yardstick:
             if not size + opposite < self.most:
                 return Measure(np.inf, opposite, rest)
             missing = self._missing(effect, size)
-        return Measure(size + opposite, opposite, rest)
+        leaves = float(np.sqrt(np.mean(missing[acts] ** 2)))
+        # Gear friction that makes up most of the force is a gain, which the nominal model takes up again.
+        near = abs(leaves - times * rest) <= _NEAR * times * rest
+        return Measure(size + opposite if near else np.inf, opposite, rest)
 
     def _missing(self, effect: str, size: float) -> Array:
         """What ``effect`` of that ``size`` leaves missing [F], shape ``(n,)``; nothing where the model takes up all of it."""
