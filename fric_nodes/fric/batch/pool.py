@@ -21,6 +21,7 @@ from .job import Entry, Job, lost, work
 __all__ = ["ALONE", "Workers", "worked"]
 
 _UNDER_WAY = 2  # recordings for each thread of a worker: one in work and one that waits for it (numerical)
+_KEPT = 1 << 25  # [byte]: arrays up to this size lie in memory that a worker keeps for its next (numerical: glibc's maximum)
 _START = 120.0  # [s] for workers to come up (physical: importing and unpacking compiled code on a slow disk)
 
 
@@ -136,6 +137,10 @@ def _client(workers: Workers) -> Iterator[Any]:
         "distributed.worker.memory.spill": False,
         "distributed.worker.memory.pause": False,
         "distributed.worker.memory.terminate": 0.95,
+        # Dask makes workers return freed memory at once. Each array of a recording would then be new pages to fill with zeros:
+        # half of the time of a worker.
+        "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 8 * _KEPT,
+        "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": _KEPT,
         "distributed.admin.tick.limit": "60s",
     }
     with dask.config.set(settings), ExitStack() as stack:
