@@ -9,9 +9,10 @@ from types import SimpleNamespace
 import fric
 import numpy as np
 import pytest
+from fric.diagnosis.limits import Limit
 from fric.diagnosis.prove import injection_exam
 from fric.diagnosis.prove.calibrating import trials_of
-from fric.diagnosis.prove.injection import CHANGED, INJECTED, Injected, injected, injections
+from fric.diagnosis.prove.injection import CHANGED, INJECTED, Injected, at_limit, can_be_at_limit, injected, injections
 from fric.diagnosis.prove.injection_exam import examined
 from fric.effects import EFFECTS
 from fric.errors import InputError
@@ -71,6 +72,42 @@ def test_the_axis_with_the_effect_moves_the_same_under_the_changed_effort(effect
     without = fric.simulate(NOMINAL, changed.effort, period=H)
     off = np.max(np.abs(moved.position - plain.position))
     assert off < 0.1 * np.max(np.abs(without.position - plain.position))
+
+
+@pytest.mark.parametrize(
+    ("effect", "strength", "others"),
+    [
+        ("stribeck", {"force": 3.0}, {"velocity": 0.2}),
+        ("ripple", {"cosine": 2.0}, {"sine": 0.0, "period": 0.9}),
+        ("quadratic_drag", {"coefficient": 1.2}, {}),
+        ("time_drift", {"change": 0.3}, {"time": 3.0}),
+        ("delay", {"time": 4e-3}, {}),
+        ("gear_friction", {"coefficient": 0.05}, {}),
+    ],
+)
+def test_the_axis_with_a_multiple_of_the_limit_moves_the_same_under_the_changed_effort(
+    effect: str, strength: dict[str, float], others: dict[str, float]
+) -> None:
+    t = H * np.arange(6000)
+    force = 30.0 * np.sin(2.0 * np.pi * 0.8 * t) + 12.0 * np.sin(2.0 * np.pi * 1.7 * t)
+    plain = replace(fric.simulate(NOMINAL, force, period=H), effort=force)
+    ((name, value),) = strength.items()
+    limit = Limit(effect, "", name, value, False, "", "", term(effect, **strength, **others))
+    assert can_be_at_limit(limit)
+    (changed,) = at_limit([plain], NOMINAL, limit, 1.5)
+    axis = NOMINAL.with_terms((*NOMINAL.terms, term(effect, **{name: 1.5 * value}, **others)))
+    moved = fric.simulate(axis, changed.effort, period=H)
+    without = fric.simulate(NOMINAL, changed.effort, period=H)
+    off = np.max(np.abs(moved.position - plain.position))
+    assert off < 0.1 * np.max(np.abs(without.position - plain.position))
+
+
+def test_what_cant_be_put_into_the_effort_at_its_limit_is_left_out() -> None:
+    assert not can_be_at_limit(Limit("stribeck", "", "", None, False, "", "the fitted parameters do the same"))
+    backlash = term("backlash", gap=1e-5)
+    assert not can_be_at_limit(Limit("backlash", "", "gap", 1e-5, False, "m", "", backlash))
+    directional = term("gear_friction", "directional", driving=0.1, driven=0.05)
+    assert not can_be_at_limit(Limit("gear_friction", "", "driving", 0.1, False, "1", "", directional))
 
 
 def test_recordings_at_one_speed_each_are_refused(record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,7 @@ class Limit:
         softer: True where the effect grows as the parameter falls, as with a stiffness in series.
         unit: of the size.
         why: no size can be stated; empty where one is.
+        term: the effect of that size; None where none can be stated.
     """
 
     effect: str
@@ -60,6 +61,7 @@ class Limit:
     softer: bool
     unit: str
     why: str
+    term: Term | None = field(default=None, repr=False)
 
     def as_json(self) -> dict[str, Any]:
         """As ``report.json`` has it."""
@@ -71,8 +73,15 @@ class Limit:
         """In one phrase."""
         if self.size is None:
             return f"{self.title}: {self.why}"
+        return f"{self.title} {'below' if self.softer else 'above'} {self.stated}"
+
+    @property
+    def stated(self) -> str:
+        """The size, with its unit and the parameter that it is one of; empty where no size can be stated."""
+        if self.size is None:
+            return ""
         size = f"{self.size:.2g}" if self.unit == "1" else f"{self.size:.2g} {self.unit}"
-        return f"{self.title} {'below' if self.softer else 'above'} {size} ({self.parameter})"
+        return f"{size} ({self.parameter})"
 
 
 def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units) -> tuple[Limit, ...]:
@@ -137,9 +146,11 @@ class _Search:
         needed = self.needed(column.parts[0])
         if needed is None:
             return _none(effect, _THE_SAME)
-        declared = next(p for p in effect.parameters if p.name == column.amplitudes[0])
+        strength = column.amplitudes[0]
         size = needed + abs(self.hidden(column.parts[0]))
-        return Limit(effect.id, effect.title, declared.name, size, False, declared.unit(self.units), "")
+        others = dict.fromkeys(column.amplitudes, 0.0)
+        values = column.term.by_name | others | {strength: size}
+        return self._stated(Term(effect, tuple(values.values())), strength, softer=False)
 
     def whole(self, column: Column) -> Limit:
         """Of an effect with another strength: from the size that was tried to the one at which its own column is enough."""
@@ -157,18 +168,28 @@ class _Search:
             if 1.0 / _NEAR < needed < _NEAR:
                 times = needed + max(self.hidden(change), 0.0)
                 size = value / times if softer else value * times
-                return Limit(held.effect.id, held.effect.title, declared.name, size, softer, declared.unit(self.units), "")
+                return self._stated(_with(held, at, size), declared.name, softer=softer)
             by = min(max(needed, 1.0 / _STEP), _STEP)
             value = value / by if softer else value * by
-            values = tuple(value if k == at else each for k, each in enumerate(held.values))
             model = self.state.fit.model
             try:
-                grown = model.with_terms((*model.terms, Term(held.effect, values)))
+                grown = model.with_terms((*model.terms, _with(held, at, value)))
             except ModelError:
                 break
             change = self.track.residual(grown) - self.state.fit.residual
             needed = self.needed(change)
         return _none(held.effect, "no size was found at which it begins to show")
+
+    def _stated(self, held: Term, strength: str, *, softer: bool) -> Limit:
+        """The limit that ``held`` has the size of, by its parameter ``strength``."""
+        at = [p.name for p in held.effect.parameters].index(strength)
+        unit = held.effect.parameters[at].unit(self.units)
+        return Limit(held.effect.id, held.effect.title, strength, held.values[at], softer, unit, "", held)
+
+
+def _with(held: Term, at: int, value: float) -> Term:
+    """``held`` with another value of its parameter number ``at``."""
+    return Term(held.effect, tuple(value if k == at else each for k, each in enumerate(held.values)))
 
 
 def _none(effect: Effect, why: str) -> Limit:

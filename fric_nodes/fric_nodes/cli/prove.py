@@ -27,6 +27,14 @@ class Injections:
     sizes: Annotated[
         str, typer.Option("--sizes", help="With --inject: sizes, as multiples of what stays unexplained where the effect acts.")
     ] = "3,6"
+    limits: Annotated[
+        bool,
+        typer.Option(
+            "--limits",
+            help="With --inject: conceal each effect at one and a half of its detection limit and at half of it, instead of "
+            "--sizes.",
+        ),
+    ] = False
     only: Annotated[str, typer.Option("--only", help="With --inject: effects, separated by commas. If not given: all.")] = ""
     blocks: Annotated[
         int, typer.Option("--blocks", help="With --inject: parts of each recording; every other one is kept for the test.")
@@ -186,13 +194,15 @@ def _inject(
     from fric.diagnosis.prove.injection_exam import examined
     from fric.files import write_text
     from fric.model_file import read_model
-    from fric.report.injection import injection_page
+    from fric.report.injection import found_in_words, injection_page
 
     if model is None or not recordings:
         raise InputError(
             "--inject" if model is None else "--model", "needs the other of the two", "give --inject BAG --model M"
         )
-    wanted = _wanted(asked.sizes, asked.only)
+    if asked.limits and asked.only:
+        raise InputError("--only", "doesn't go with --limits, which conceals every effect with a limit", "leave one out")
+    wanted = None if asked.limits else _wanted(asked.sizes, asked.only)
     records = read_all(recordings, reading)
     bare, outcomes = examined(records, read_model(model), wanted, asked.blocks, out, progress, effort.jobs, effort.at_most)
     command = _command(recordings, model, asked, effort, reading, out)
@@ -207,6 +217,7 @@ def _inject(
                 "times": each.what.times,
                 "rms": each.rms,
                 "rest": each.rest,
+                "limit": each.limit,
                 "presence": each.presence,
                 "wrong": list(each.wrong),
                 "failure": each.failure,
@@ -218,9 +229,7 @@ def _inject(
     if as_json:
         typer.echo(json.dumps(result))
         return
-    typer.echo(
-        f"{result['found']} of {result['of']} concealed effects found; in {result['with_wrong_names']} another was named"
-    )
+    typer.echo(f"{found_in_words(outcomes)}; in {result['with_wrong_names']} another was named")
     typer.echo(f"written: {out / 'injection.html'}")
 
 
@@ -251,7 +260,8 @@ def _wanted(sizes: str, only: str) -> list[Injected]:
 def _command(recordings: list[Path], model: Path, asked: Injections, effort: Effort, reading: Reading, out: Path) -> str:
     """What makes the page again, with the names of files alone."""
     words = ["fric prove", *(f"--inject {each.name}" for each in recordings), f"--model {model.name}"]
-    words += [f"--sizes {asked.sizes}", f"--blocks {asked.blocks}", *([f"--only {asked.only}"] if asked.only else [])]
+    words += ["--limits" if asked.limits else f"--sizes {asked.sizes}", f"--blocks {asked.blocks}"]
+    words += [f"--only {asked.only}"] if asked.only else []
     words += [effort.words.strip()] if effort.words else []
     words += ["--repair"] if reading.repair else []
     words += [f"--time {reading.time}"] if reading.time != "stamp" else []

@@ -7,6 +7,7 @@ friction of a gear asks for more of the effort that drives and for less of the e
 stands beside: what is found there is the axis's own and counts neither way.
 
 How large an effect has to be to leave a multiple of what stays unexplained in the recording as it is says :mod:`.yardstick`.
+Where it is to have a multiple of its detection limit, it is the law for which that limit was stated.
 """
 
 from __future__ import annotations
@@ -17,9 +18,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from ...identification.equations import surroundings
+from ...model import Model, Term
 from ...record import Array, Record
+from ...simulation import predict_force
+from ..limits import Limit
 
-__all__ = ["CHANGED", "INJECTED", "Injected", "injected", "injections"]
+__all__ = ["CHANGED", "INJECTED", "Injected", "acting", "at_limit", "can_be_at_limit", "injected", "injections"]
 
 _CUTOFF = 40.0  # physical [Hz]: where axes' friction changes with their motion
 _TOLD = 0.1  # numerical, of the sampling rate: what is faster isn't told from noise
@@ -71,18 +76,21 @@ class Changed:
     """An effect that changes the effort itself.
 
     Attributes:
+        parameter: of the vocabulary's effect, that says how large it is.
         slope: what a small one adds, of the size of one [F], to a force without noise and with the motion, shape ``(n,)``.
         force: the whole force with one of the given size [F], shape ``(n,)``.
     """
 
+    parameter: str
     slope: Callable[[Array, Motion], Array]
     force: Callable[[Array, Motion, float], Array]
 
 
 CHANGED: dict[str, Changed] = {
-    "delay": Changed(_slope, lambda force, motion, size: np.interp(motion.time + size, motion.time, force)),
-    "actuator_lag": Changed(_slope, lambda force, motion, size: force + size * _slope(force, motion)),
+    "delay": Changed("time", _slope, lambda force, motion, size: np.interp(motion.time + size, motion.time, force)),
+    "actuator_lag": Changed("time", _slope, lambda force, motion, size: force + size * _slope(force, motion)),
     "gear_friction": Changed(
+        "coefficient",
         lambda force, motion: np.abs(force) * motion.sign,
         # The effort of which friction of ``size`` times itself leaves the recorded one.
         lambda force, motion, size: force / (1.0 - size * motion.sign * np.sign(force)),
@@ -117,20 +125,14 @@ def injected(records: Sequence[Record], effect: str, size: float) -> list[Record
         effect: id of the vocabulary, of :data:`INJECTED` or :data:`CHANGED`.
         size: root mean square of the force that is added where the effect acts [F].
     """
-    motions = [_motion(record) for record in records]
-    fast = float(np.quantile(np.abs(np.concatenate([each.velocity for each in motions])), _FAST))
-    low = min(float(np.min(each.position)) for each in motions)
-    high = max(float(np.max(each.position)) for each in motions)
-    moved, made = [], []
+    moved = _motions(records)
     changing = CHANGED.get(effect)
-    for record, each in zip(records, motions, strict=True):
-        sign = np.where(np.abs(each.velocity) > _REST * fast, np.sign(each.velocity), 0.0)
-        motion = replace(each, sign=sign, fast=fast, low=low, high=high)
-        moved.append(motion)
-        made.append(INJECTED[effect](motion) if changing is None else changing.slope(_without_noise(record), motion))
+    made = [
+        INJECTED[effect](motion) if changing is None else changing.slope(_without_noise(record), motion)
+        for record, motion in zip(records, moved, strict=True)
+    ]
     joined = np.concatenate(made)
-    acts = np.abs(joined) > _ACTS * float(np.max(np.abs(joined)))
-    scale = size / float(np.sqrt(np.mean(joined[acts] ** 2)))
+    scale = size / float(np.sqrt(np.mean(joined[acting(joined)] ** 2)))
     added = []
     for record, motion, force in zip(records, moved, made, strict=True):
         if changing is None:
@@ -139,6 +141,69 @@ def injected(records: Sequence[Record], effect: str, size: float) -> list[Record
             plain = _without_noise(record)
             added.append(changing.force(plain, motion, scale) - plain)
     return [replace(record, effort=record.effort + each) for record, each in zip(records, added, strict=True)]
+
+
+def acting(force: Array) -> Array:
+    """Where a force acts: True where it isn't small beside its largest value, shape ``(n,)``."""
+    size = np.abs(force)
+    return np.asarray(size > _ACTS * np.max(size))
+
+
+def can_be_at_limit(limit: Limit) -> bool:
+    """True where a limit states a size, and such an effect can be put into the effort."""
+    changing = CHANGED.get(limit.effect)
+    return limit.term is not None and (limit.effect in INJECTED if changing is None else limit.parameter == changing.parameter)
+
+
+def at_limit(records: Sequence[Record], model: Model, limit: Limit, times: float) -> list[Record]:
+    """``records`` with an effect concealed in their effort that has ``times`` the strength of its detection limit.
+
+    Args:
+        records: of one axis.
+        model: beside which the limit was stated.
+        limit: of the effect, one with which this can be done (:func:`can_be_at_limit`).
+        times: of it.
+    """
+    held, changing = limit.term, CHANGED.get(limit.effect)
+    assert held is not None
+    strength = times * held.by_name[limit.parameter]
+    values = held.by_name | {limit.parameter: strength}
+    whole = model.with_terms((*model.terms, Term(held.effect, tuple(values.values()))))
+    found = []
+    for record, motion in zip(records, _motions(records), strict=True):
+        if changing is None:
+            added = _needed(whole, record, motion) - _needed(model, record, motion)
+        else:
+            plain = _without_noise(record)
+            added = changing.force(plain, motion, strength) - plain
+        found.append(replace(record, effort=record.effort + added))
+    return found
+
+
+def _needed(model: Model, record: Record, motion: Motion) -> Array:
+    """Force that ``model`` needs for the motion [F]; of friction, none where the axis may rest."""
+    moves = np.where(motion.sign == 0.0, 0.0, motion.velocity)
+    acceleration = np.gradient(motion.velocity, motion.time)
+    load, temperature = surroundings(record)
+    return predict_force(model, motion.time, motion.position, moves, acceleration, record.sample_time, load, temperature)
+
+
+def _motions(records: Sequence[Record]) -> list[Motion]:
+    """Of recordings of one axis, which have one fast motion and one travel."""
+    motions = [_motion(record) for record in records]
+    fast = float(np.quantile(np.abs(np.concatenate([each.velocity for each in motions])), _FAST))
+    low = min(float(np.min(each.position)) for each in motions)
+    high = max(float(np.max(each.position)) for each in motions)
+    return [
+        replace(
+            each,
+            sign=np.where(np.abs(each.velocity) > _REST * fast, np.sign(each.velocity), 0.0),
+            fast=fast,
+            low=low,
+            high=high,
+        )
+        for each in motions
+    ]
 
 
 def _without_noise(record: Record) -> Array:

@@ -1,5 +1,8 @@
 """The diagnosis examined on effects that were concealed in recordings of a real axis (:mod:`.injection`).
 
+They are as large as multiples of what stays unexplained, or of their detection limits as the diagnosis of the recordings as
+they are states them: above these they should be found, below not.
+
 Each is diagnosed in a process of its own pool, and written down when it is done: a stopped examination goes on in its folder.
 """
 
@@ -10,8 +13,11 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ...errors import InputError
 from ...files import write_text
@@ -24,14 +30,17 @@ from ..deadline import refuse_no_time
 from ..diagnose import diagnose
 from ..result import Diagnosis, Finding
 from .examination import in_processes
-from .injection import Injected, injected
+from .injection import Injected, acting, at_limit, can_be_at_limit, injected
 from .yardstick import Yardstick
 
-__all__ = ["CANNOT_SHOW", "InjectionOutcome", "examined", "told_in"]
+__all__ = ["AT_LIMITS", "CANNOT_SHOW", "InjectionOutcome", "examined", "told_in"]
+
+AT_LIMITS = (1.5, 0.5)
+"""Of its detection limit: an effect that should be found, and one that should not."""
 
 CANNOT_SHOW = "can't show in this motion"
 """Of an effect that the nominal model's own parameters take up, or that would have to be larger than the force itself."""
-_SIZED = "by what it leaves missing"
+_SIZED, _LIMITED = "by what it leaves missing", "by its detection limit"
 _FOLDER = "injected"
 
 
@@ -42,7 +51,8 @@ class InjectionOutcome:
     Attributes:
         what: was injected.
         rms: root mean square of the added force where it acts [F].
-        rest: that of what stays unexplained there in the recordings as they are [F].
+        rest: that of what stays unexplained there in the recordings as they are [F]; None where the size is one of a limit.
+        limit: the detection limit of which the size is a multiple, in words; empty where it is one of the rest.
         presence: of the injected effect; 0 where it isn't named.
         wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor named in the recordings
             as they are, however surely: what is named there may be the axis's own.
@@ -51,10 +61,11 @@ class InjectionOutcome:
 
     what: Injected
     rms: float
-    rest: float
+    rest: float | None
     presence: float
     wrong: tuple[str, ...]
     failure: str = ""
+    limit: str = ""
 
     @property
     def asked(self) -> bool:
@@ -70,7 +81,7 @@ class InjectionOutcome:
 def examined(
     records: Sequence[Record],
     nominal: Model,
-    wanted: Sequence[Injected],
+    wanted: Sequence[Injected] | None,
     n_blocks: int,
     out: Path,
     progress: Callable[[str], None],
@@ -82,7 +93,7 @@ def examined(
     Args:
         records: of one axis.
         nominal: what the diagnosis starts from.
-        wanted: what is concealed, one at a time.
+        wanted: what is concealed, one at a time; every effect whose detection limit is stated, :data:`AT_LIMITS`, when None.
         n_blocks: into which each recording is cut, every other one held back.
         out: folder; one that holds the same examination is gone on with.
         progress: told what goes on.
@@ -93,24 +104,61 @@ def examined(
         InputError: the folder holds another examination, ``at_most`` is no time, or every recording is at one speed.
     """
     refuse_no_time(at_most)
-    _claim(out, records, nominal, n_blocks, at_most)
+    _claim(out, records, nominal, n_blocks, at_most, _LIMITED if wanted is None else _SIZED)
     progress("diagnosing the recordings as they are")
     bare = diagnose(*in_blocks(records, n_blocks), nominal, at_most=at_most)
     if bare.by_means:
         problem = "is at one speed, as all others are: what is concealed in it would be a friction curve's mean alone"
         raise InputError(records[0].source, problem, "give recordings whose speed changes")
     own = {each.effect: each.confidence for each in reversed(bare.findings)}
-    waiting = [what for what in wanted if not _at(out, what).exists()]
-    yardstick = Yardstick(records, bare)
+    plans = [*(_at_limits(bare) if wanted is None else _by_rest(records, bare, wanted))]
     tasks: list[tuple[object, ...]] = []
-    for what in waiting:
-        measured = yardstick.measure(what.effect, what.times)
-        if math.isinf(measured.size):
-            _write(out, what, 0.0, measured.rest, own, CANNOT_SHOW, ())
+    for plan in plans:
+        if _at(out, plan.what).exists():
+            continue
+        if plan.conceal is None:
+            _write(out, plan, 0.0, own, CANNOT_SHOW, ())
         else:
-            tasks.append((str(out), what, records, nominal, measured.size, measured.rest, n_blocks, own, at_most))
+            tasks.append((str(out), plan, records, nominal, n_blocks, own, at_most))
     in_processes(_diagnosed, tasks, progress, "diagnosed", jobs)
-    return bare, [_outcome(json.loads(_at(out, what).read_text(encoding="utf-8"))) for what in wanted]
+    return bare, [_outcome(json.loads(_at(out, plan.what).read_text(encoding="utf-8"))) for plan in plans]
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """One injection.
+
+    Attributes:
+        what: is injected.
+        conceal: recordings to those with it; None where it could not show.
+        rest: as of :class:`InjectionOutcome`.
+        limit: likewise.
+    """
+
+    what: Injected
+    conceal: Callable[[Sequence[Record]], list[Record]] | None
+    rest: float | None = None
+    limit: str = ""
+
+
+def _by_rest(records: Sequence[Record], bare: Diagnosis, wanted: Sequence[Injected]) -> Iterator[_Plan]:
+    """What is ``wanted``, as large as multiples of what stays unexplained."""
+    yardstick = Yardstick(records, bare)
+    for what in wanted:
+        measured = yardstick.measure(what.effect, what.times)
+        shows = math.isfinite(measured.size)
+        conceal = partial(injected, effect=what.effect, size=measured.size) if shows else None
+        yield _Plan(what, conceal, rest=measured.rest)
+
+
+def _at_limits(bare: Diagnosis) -> Iterator[_Plan]:
+    """Every effect with a detection limit that can be put into the effort, above it and below."""
+    for limit in bare.limits:
+        if can_be_at_limit(limit):
+            for times in AT_LIMITS:
+                what = Injected(limit.effect, times)
+                conceal = partial(at_limit, model=bare.model, limit=limit, times=times)
+                yield _Plan(what, conceal, limit=limit.stated)
 
 
 def told_in(out: Path) -> Iterator[dict[str, Any]]:
@@ -126,10 +174,10 @@ def _at(out: Path, what: Injected) -> Path:
     return out / _FOLDER / f"{what.effect}_{what.times:g}.json"
 
 
-def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int, at_most: float | None) -> None:
+def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int, at_most: float | None, sized: str) -> None:
     """Write down of what it is, or check that the folder holds the same."""
     limit = "" if at_most is None else f" {at_most}"
-    told = hashlib.sha256(f"{model_to_text(nominal)} {n_blocks}{limit} {_SIZED}".encode())
+    told = hashlib.sha256(f"{model_to_text(nominal)} {n_blocks}{limit} {sized}".encode())
     for record in records:
         for each in (record.time, record.position, record.effort, record.mask):
             told.update(each.tobytes())
@@ -142,39 +190,37 @@ def _claim(out: Path, records: Sequence[Record], nominal: Model, n_blocks: int, 
 
 def _diagnosed(
     out: str,
-    what: Injected,
+    plan: _Plan,
     records: Sequence[Record],
     nominal: Model,
-    size: float,
-    rest: float,
     n_blocks: int,
     own: Mapping[str, float],
     at_most: float | None,
 ) -> None:
-    """Diagnose ``records`` with ``what`` concealed in them, and write down what was said."""
-    failure = ""
+    """Diagnose ``records`` with what is planned concealed in them, and write down what was said."""
+    assert plan.conceal is not None
+    failure, rms = "", 0.0
     findings: tuple[Finding, ...] = ()
     try:
-        changed = injected(records, what.effect, size)
+        changed = plan.conceal(records)
+        rms = _added(records, changed)
         findings = diagnose(*in_blocks(changed, n_blocks), nominal, at_most=at_most).findings
     except InputError as error:
         failure = str(error)
-    _write(Path(out), what, size, rest, own, failure, findings)
+    _write(Path(out), plan, rms, own, failure, findings)
 
 
-def _write(
-    out: Path,
-    what: Injected,
-    size: float,
-    rest: float,
-    own: Mapping[str, float],
-    failure: str,
-    findings: Sequence[Finding],
-) -> None:
+def _added(records: Sequence[Record], changed: Sequence[Record]) -> float:
+    """Root mean square of what is concealed, where it acts [F]."""
+    added = np.concatenate([new.effort - old.effort for old, new in zip(records, changed, strict=True)])
+    return float(np.sqrt(np.mean(added[acting(added)] ** 2)))
+
+
+def _write(out: Path, plan: _Plan, rms: float, own: Mapping[str, float], failure: str, findings: Sequence[Finding]) -> None:
     """Write down what was said of one."""
-    told = {"injected": asdict(what), "rms": size, "rest": rest, "own": dict(own)}
+    told = {"injected": asdict(plan.what), "rms": rms, "rest": plan.rest, "limit": plan.limit, "own": dict(own)}
     told |= {"failure": failure, "findings": [*map(_said, findings)]}
-    at = _at(out, what)
+    at = _at(out, plan.what)
     at.parent.mkdir(parents=True, exist_ok=True)
     write_text(at, json.dumps(told, indent=1))
 
@@ -191,4 +237,5 @@ def _outcome(told: dict[str, Any]) -> InjectionOutcome:
     sure = {each["effect"]: each["confidence"] for each in reversed(told["findings"])}
     own = {what.effect, "unknown", *told["own"]}
     wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in own)
-    return InjectionOutcome(what, told["rms"], told["rest"], sure.get(what.effect, 0.0), tuple(sorted(wrong)), told["failure"])
+    presence, limit = sure.get(what.effect, 0.0), told.get("limit", "")
+    return InjectionOutcome(what, told["rms"], told["rest"], presence, tuple(sorted(wrong)), told["failure"], limit)

@@ -25,11 +25,10 @@ from ..least_squares import limits_of
 from ..result import Diagnosis
 from ..start import lateness
 from ..track import Track
-from .injection import injected
+from .injection import acting, injected
 
 __all__ = ["Measure", "Yardstick"]
 
-_ACTS = 0.05  # of its largest value: where less is missing the effect does not act
 _TAKEN_UP = 0.1  # of itself: what leaves less, less than motion and its turns are known to, is taken up
 _STEPS = 4  # numerical: towards the size
 _NEAR = 0.2  # numerical, of what is to be left missing: a size that comes no nearer in so many steps isn't one
@@ -94,10 +93,9 @@ class Yardstick:
         """How large ``effect`` has to be to leave ``times`` as much missing as stays unexplained where it acts."""
         size = self._little
         missing = self._missing(effect, size)
-        most = float(np.max(np.abs(missing)))
-        if most == 0.0:
+        if not np.any(missing):
             return Measure(np.inf, 0.0, 0.0)
-        acts = np.abs(missing) > _ACTS * most
+        acts = acting(missing)
         rest = float(np.sqrt(np.mean(self._stays[acts] ** 2)))
         opposite = max(-float(self._lacking @ missing) / float(missing @ missing) * size, 0.0)
         for _ in range(_STEPS):
