@@ -22,7 +22,7 @@ from fric.batch.fleet.page import fleet_page
 from fric.batch.job import Job
 from fric.batch.journal import Journal
 from fric.batch.notable import reports_of
-from fric.batch.pool import ALONE, Workers
+from fric.batch.pool import ALONE, Workers, client_of
 from fric.batch.recordings import find
 from fric.batch.run import Batch, run_batch
 from fric.batch.table import Naming
@@ -84,6 +84,25 @@ def test_every_broken_recording_is_reported_and_stops_none(logs: Path, job: Job,
     assert set(rows) - set(refused) <= {"bytes_overwritten"}
     assert all(line and "\n" not in line and "Traceback" not in line and str(logs) not in line for line in refused.values())
     assert not any("error of fric" in line for line in refused.values()), refused
+
+
+def test_a_worker_keeps_the_memory_of_one_recording_for_the_next() -> None:
+    def pages_taken() -> int:
+        """New pages of a hundred arrays, as long as those of a recording, of which each is freed before the next."""
+        import resource
+
+        def taken() -> int:
+            return resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+
+        for _ in range(3):
+            np.ones(20_000)
+        before = taken()
+        for _ in range(100):
+            np.ones(20_000)
+        return taken() - before
+
+    with client_of(Workers(1)) as client:
+        assert client.submit(pages_taken).result(timeout=60) < 400  # 40 pages each, where none is kept
 
 
 @pytest.mark.long

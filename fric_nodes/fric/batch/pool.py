@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..threads import alone
 from .job import Entry, Job, lost, work
 
-__all__ = ["ALONE", "Workers", "worked"]
+__all__ = ["ALONE", "Workers", "client_of", "worked"]
 
 _UNDER_WAY = 2  # recordings for each thread of a worker: one in work and one that waits for it (numerical)
 _KEPT = 1 << 25  # [byte]: arrays up to this size lie in memory that a worker keeps for its next (numerical: glibc's maximum)
@@ -53,7 +53,7 @@ def worked(paths: Iterable[str], job: Job, workers: Workers) -> Iterator[tuple[s
     if workers.number == 0 and not workers.scheduler:
         yield from ((path, work(path, job)) for path in paths)
         return
-    with _client(workers) as client:
+    with client_of(workers) as client:
         yield from _by_dask(client, paths, job)
 
 
@@ -118,7 +118,12 @@ def _remote_work(path: str, job: Job) -> Entry:
 
 
 @contextmanager
-def _client(workers: Workers) -> Iterator[Any]:
+def client_of(workers: Workers) -> Iterator[Any]:
+    """A client of Dask with ``workers`` behind it, which end with it.
+
+    Raises:
+        InputError: none can be had.
+    """
     try:
         import dask.utils
         from distributed import Client, LocalCluster
