@@ -92,7 +92,7 @@ def test_the_axis_with_a_multiple_of_the_limit_moves_the_same_under_the_changed_
     force = 30.0 * np.sin(2.0 * np.pi * 0.8 * t) + 12.0 * np.sin(2.0 * np.pi * 1.7 * t)
     plain = replace(fric.simulate(NOMINAL, force, period=H), effort=force)
     ((name, value),) = strength.items()
-    limit = Limit(effect, "", name, value, False, "", "", term(effect, **strength, **others))
+    limit = Limit(effect, "", name, value, False, "", "", "", term(effect, **strength, **others))
     assert can_be_at_limit(limit)
     (changed,) = at_limit([plain], NOMINAL, limit, 1.5)
     axis = NOMINAL.with_terms((*NOMINAL.terms, term(effect, **{name: 1.5 * value}, **others)))
@@ -105,9 +105,9 @@ def test_the_axis_with_a_multiple_of_the_limit_moves_the_same_under_the_changed_
 def test_what_cant_be_put_into_the_effort_at_its_limit_is_left_out() -> None:
     assert not can_be_at_limit(Limit("stribeck", "", "", None, False, "", "the fitted parameters do the same"))
     backlash = term("backlash", gap=1e-5)
-    assert not can_be_at_limit(Limit("backlash", "", "gap", 1e-5, False, "m", "", backlash))
+    assert not can_be_at_limit(Limit("backlash", "", "gap", 1e-5, False, "m", "", "", backlash))
     directional = term("gear_friction", "directional", driving=0.1, driven=0.05)
-    assert not can_be_at_limit(Limit("gear_friction", "", "driving", 0.1, False, "1", "", directional))
+    assert not can_be_at_limit(Limit("gear_friction", "", "driving", 0.1, False, "1", "", "", directional))
 
 
 def test_recordings_at_one_speed_each_are_refused(record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

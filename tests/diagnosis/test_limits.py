@@ -46,7 +46,7 @@ def followed(record: Record) -> tuple[Track, State]:
 def limits() -> dict[str, Limit]:
     track, state = followed(recording())
     tried = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False).tried
-    return {each.effect: each for each in limits_of(track, state, tried, Units())}
+    return {each.effect: each for each in limits_of(track, state, tried, Units(), anything=False)}
 
 
 def evidence(added: Term) -> float:
@@ -71,6 +71,18 @@ def test_an_effect_shows_above_its_limit_and_not_below_it(limits: dict[str, Limi
     assert weak < EVIDENCE
 
 
+def test_what_acts_alike_on_these_motions_is_named_with_the_limit(limits: dict[str, Limit]) -> None:
+    # While it slides both ways at like speeds, a bias is another Coulomb level forward than backward.
+    assert limits["asymmetry"].like == "bias"
+    assert limits["bias"].like == "asymmetry"
+    # What is slow beside the observer can't tell a delay from a lag.
+    assert limits["delay"].like == "actuator_lag"
+    assert limits["delay"].sentence.endswith("(time), perhaps as lag of the actuator")
+    assert not limits["ripple"].like
+    assert not limits["time_drift"].like
+    assert limits["ripple"].sentence.endswith("(cosine)")
+
+
 def test_what_is_not_recorded_has_no_limit_and_says_why(limits: dict[str, Limit]) -> None:
     assert limits["temperature"].size is None
     assert "hold nothing" in limits["temperature"].why
@@ -83,7 +95,7 @@ def test_what_is_not_recorded_has_no_limit_and_says_why(limits: dict[str, Limit]
 def test_what_may_be_hidden_in_the_rest_would_not_have_shown(hidden: Term) -> None:
     track, state = followed(recording(hidden))  # nothing was found: all that is missing is left
     tried = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False).tried
-    limit = next(each for each in limits_of(track, state, tried, Units()) if each.effect == hidden.effect.id)
+    limit = next(each for each in limits_of(track, state, tried, Units(), anything=False) if each.effect == hidden.effect.id)
     assert limit.size is not None
     there = dict(zip((p.name for p in hidden.effect.parameters), hidden.values, strict=True))
     assert limit.size > 0.9 * there[limit.parameter]

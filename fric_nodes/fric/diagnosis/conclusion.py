@@ -198,7 +198,7 @@ def concluded(
         bandwidth=held.bandwidth,
         grown=growth_told(growth),
         only_held_back=alone is not None,
-        limits=limits_of(growth.track, growth.end, growth.last, seen.end.units),
+        limits=limits_of(growth.track, growth.end, growth.last, seen.end.units, anything=bool(growth.steps)),
         fitted_on=tuple(record.source for record in train),
         tested_on=tuple(record.source for record in validation),
     )

@@ -20,7 +20,7 @@ from .screen import Screening, Tried, screen
 from .track import Track
 from .twin import twins
 
-__all__ = ["faint_term"]
+__all__ = ["beyond_chance", "faint_term"]
 
 _FAINT = 0.04  # of the floor, and
 _DRAWS = 40.0  # times what one parameter takes off noise: so little may still be seen clearly
@@ -41,7 +41,7 @@ def faint_term(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], No
             return None
         state = refit(track, nominal)
         found = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False)
-        clear = tuple(each for each in found.tried if each.gain > _chance_of(track, state, (each,)))
+        clear = tuple(each for each in found.tried if each.gain > beyond_chance(track, state, (each,)))
         if not clear:
             continue
         surprise = clear[0].gain / state.floor * track.independent
@@ -51,14 +51,14 @@ def faint_term(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], No
         return None
     _, track, state, found = best
     rivals = rivals_of(track, state, found, scales_of(track))
-    rivals = [rival for rival in rivals if state.left - rival.left > _chance_of(track, state, rival.offer)]
+    rivals = [rival for rival in rivals if state.left - rival.left > beyond_chance(track, state, rival.offer)]
     if not rivals:
         return None
     others = [state.left - rival.left for rival in rivals if rival.effect.id != rivals[0].effect.id]
     gain = state.left - rivals[0].left
     if max(others, default=0.0) > _ALIKE * gain:
         return None
-    if gain - _of_noise(track, state, rivals[0]) < _chance_of(track, state, rivals[0].offer):
+    if gain - _of_noise(track, state, rivals[0]) < beyond_chance(track, state, rivals[0].offer):
         return None
     return grown_on(
         [track], extended_by_terms([track], Growth(track, state, state, (), (), 1.0), rivals[0], tell, most=1), tell
@@ -78,7 +78,7 @@ def _of_noise(track: Track, state: State, rival: Rival) -> float:
     return left[0] - left[1]
 
 
-def _chance_of(track: Track, state: State, tried: Sequence[Tried]) -> float:
+def beyond_chance(track: Track, state: State, tried: Sequence[Tried]) -> float:
     """An amount [F^2] that no candidate of ``tried`` takes off by chance."""
     by_chance = max(each.by_chance for each in tried)
     return max(state.floor * max(_FAINT, _DRAWS / track.independent), BY_CHANCE * by_chance)

@@ -3,7 +3,11 @@
 An effect of the strength A changes the missing force, at first order, by A c, with c its column on the observer. What the
 fitted parameters can do themselves is taken out of c; E is the energy of the rest and L that of what the model leaves. With N
 independent values the log likelihood would rise by (N / 2) ln(1 + A^2 E / L). The limit is the A at which that is
-:data:`EVIDENCE`: at one and a half of it most such effects are found, at half of it hardly any.
+:data:`EVIDENCE`, and A^2 E what a term has to take off to be found at all (:mod:`.price`): beyond chance, beyond what the floor
+is known to, and a real part of what is missing. At one and a half of it most such effects are found, at half of it hardly any.
+
+To be named it has to be told from every other effect, too: what the best of these can't do of c must bring twenty to one. Where
+it doesn't at the limit, at first order, the effect shows, but perhaps as that other one.
 
 What the model leaves may hold some of an effect that was not found, because nothing singles it out there. The size at which it
 would take most of that away is added: so much of it may be there already.
@@ -12,18 +16,21 @@ would take most of that away is added: so much of it may be there already.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..effect import Effect
-from ..effects import EFFECTS
+from ..effects import EFFECTS, by_name
 from ..model import ModelError, Term
 from ..record import Array, Units
 from .additive.residual import independent_values
+from .faint import beyond_chance
 from .fitting import State
+from .moves import TWENTY_TO_ONE
+from .price import OF_EXCESS, least_gain
 from .screen import OWN, Column, Tried
 from .track import Track
 
@@ -51,6 +58,7 @@ class Limit:
         softer: True where the effect grows as the parameter falls, as with a stiffness in series.
         unit: of the size.
         why: no size can be stated; empty where one is.
+        like: id of another effect that does nearly the same on these motions, so that it may be told as that; empty: none.
         term: the effect of that size; None where none can be stated.
     """
 
@@ -61,11 +69,12 @@ class Limit:
     softer: bool
     unit: str
     why: str
+    like: str = ""
     term: Term | None = field(default=None, repr=False)
 
     def as_json(self) -> dict[str, Any]:
         """As ``report.json`` has it."""
-        names = ("effect", "parameter", "size", "softer", "unit", "why")
+        names = ("effect", "parameter", "size", "softer", "unit", "why", "like")
         return {name: getattr(self, name) for name in names}
 
     @property
@@ -73,7 +82,14 @@ class Limit:
         """In one phrase."""
         if self.size is None:
             return f"{self.title}: {self.why}"
-        return f"{self.title} {'below' if self.softer else 'above'} {self.stated}"
+        like = f", perhaps as {self.like_title}" if self.like else ""
+        return f"{self.title} {'below' if self.softer else 'above'} {self.stated}{like}"
+
+    @property
+    def like_title(self) -> str:
+        """What the effect is called as which it may be told; empty where there is none."""
+        other = by_name(self.like) if self.like else None
+        return "" if other is None else other.title
 
     @property
     def stated(self) -> str:
@@ -84,7 +100,7 @@ class Limit:
         return f"{size} ({self.parameter})"
 
 
-def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units) -> tuple[Limit, ...]:
+def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units, *, anything: bool) -> tuple[Limit, ...]:
     """The limit of every effect that ``state`` has not, by name.
 
     Args:
@@ -92,40 +108,85 @@ def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units) 
         state: the model that was found, fitted.
         tried: every candidate beside it at first order.
         units: of the model.
+        anything: True where something was found.
     """
-    residual = state.fit.residual
-    n = residual.shape[0]
-    independent = independent_values(track, residual)
-    energy = math.expm1(min(2.0 * EVIDENCE / max(independent, 1.0), 50.0)) * float(residual @ residual)
+    n = state.fit.residual.shape[0]
     basis, _ = np.linalg.qr(state.fit.jacobian / np.maximum(np.linalg.norm(state.fit.jacobian, axis=0), 1e-300))
     there = {held.effect.id for held in state.fit.model.terms}
-    by_effect = {each.column.term.effect.id: each.column for each in tried if each.column.parts[0].shape[0] == n}
-    search = _Search(track, state, basis, energy, units)
+    by_effect = {each.column.term.effect.id: each for each in tried if each.column.parts[0].shape[0] == n}
+    rivals = {name: _beside(basis, trial.column) for name, trial in by_effect.items()}
     found = []
     for name, effect in sorted({effect.id: effect for effect in EFFECTS.values()}.items()):
         if name not in there:
-            column = by_effect.get(name)
-            if column is None:
+            trial = by_effect.get(name)
+            if trial is None:
                 found.append(_none(effect, "these recordings hold nothing by which it could show"))
             else:
-                found.append(search.linear(column) if column.amplitudes else search.whole(column))
+                others = {other: span for other, span in rivals.items() if other != name}
+                search = _Search(track, state, basis, *_energies(track, state, trial, anything), others, units)
+                found.append(search.linear(trial.column) if trial.column.amplitudes else search.whole(trial.column))
     return tuple(found)
+
+
+def _energies(track: Track, state: State, trial: Tried, anything: bool) -> tuple[float, float]:
+    """What an effect has to take off to be found beside ``state``, and what no rival may take off to be told from it [F^2].
+
+    What hides in the noise is asked for only alone.
+    """
+    residual = state.fit.residual
+    independent = max(independent_values(track, residual), 1.0)
+    found, told = (
+        math.expm1(min(2.0 * nats / independent, 50.0)) * float(residual @ residual) for nats in (EVIDENCE, TWENTY_TO_ONE)
+    )
+    least = least_gain(state, trial.by_chance)
+    if not anything:
+        least = min(least, beyond_chance(track, state, (trial,)))
+    # What an effect takes off is itself missing.
+    return max(found, least, OF_EXCESS / (1.0 - OF_EXCESS) * state.excess), told
+
+
+def _beside(basis: Array, column: Column) -> Array:
+    """Orthonormal columns of what the fitted parameters can't do of ``column``, shape ``(n, n_parts)``."""
+    parts = np.stack(column.parts, axis=1)
+    left = parts - basis @ (basis.T @ parts)
+    span, _ = np.linalg.qr(left / np.maximum(np.linalg.norm(left, axis=0), 1e-300))
+    return np.asarray(span)
 
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """What a limit is found with: ``basis`` spans what the fitted parameters do, ``energy`` [F^2] is to be brought."""
+    """What a limit is found with.
+
+    Attributes:
+        track: the recordings.
+        state: the model that was found.
+        basis: orthonormal columns of what the fitted parameters do.
+        energy: that an effect is to bring [F^2],
+        told: and of which no rival may bring so much [F^2].
+        rivals: orthonormal columns of what each rival does beside the fitted parameters, by its id.
+        units: of the model.
+    """
 
     track: Track
     state: State
     basis: Array
     energy: float
+    told: float
+    rivals: Mapping[str, Array]
     units: Units
 
     def needed(self, column: Array) -> float | None:
         """By what a column has to be multiplied; None where the fitted parameters do the same."""
         own = self.own(column)
         return None if own <= max(OWN**2 * float(column @ column), _TINY) else math.sqrt(self.energy / own)
+
+    def like(self, column: Array) -> str:
+        """Id of the rival that does most of a column, where it can't be told from that at its limit; else empty."""
+        beside = self.beside(column)
+        own = float(beside @ beside)
+        left = {name: own - float(np.sum((span.T @ beside) ** 2)) for name, span in self.rivals.items()}
+        name = min(left, key=lambda each: left[each], default="")
+        return name if name and left[name] * self.energy < self.told * own else ""
 
     def own(self, column: Array) -> float:
         """Energy of what the fitted parameters can't do of a column [F^2]."""
@@ -150,7 +211,8 @@ class _Search:
         size = needed + abs(self.hidden(column.parts[0]))
         others = dict.fromkeys(column.amplitudes, 0.0)
         values = column.term.by_name | others | {strength: size}
-        return self._stated(Term(effect, tuple(values.values())), strength, softer=False)
+        like = self.like(column.parts[0])
+        return self._stated(Term(effect, tuple(values.values())), strength, softer=False, like=like)
 
     def whole(self, column: Column) -> Limit:
         """Of an effect with another strength: from the size that was tried to the one at which its own column is enough."""
@@ -168,7 +230,8 @@ class _Search:
             if 1.0 / _NEAR < needed < _NEAR:
                 times = needed + max(self.hidden(change), 0.0)
                 size = value / times if softer else value * times
-                return self._stated(_with(held, at, size), declared.name, softer=softer)
+                like = self.like(change)
+                return self._stated(_with(held, at, size), declared.name, softer=softer, like=like)
             by = min(max(needed, 1.0 / _STEP), _STEP)
             value = value / by if softer else value * by
             model = self.state.fit.model
@@ -180,11 +243,11 @@ class _Search:
             needed = self.needed(change)
         return _none(held.effect, "no size was found at which it begins to show")
 
-    def _stated(self, held: Term, strength: str, *, softer: bool) -> Limit:
+    def _stated(self, held: Term, strength: str, *, softer: bool, like: str) -> Limit:
         """The limit that ``held`` has the size of, by its parameter ``strength``."""
         at = [p.name for p in held.effect.parameters].index(strength)
         unit = held.effect.parameters[at].unit(self.units)
-        return Limit(held.effect.id, held.effect.title, strength, held.values[at], softer, unit, "", held)
+        return Limit(held.effect.id, held.effect.title, strength, held.values[at], softer, unit, "", like, held)
 
 
 def _with(held: Term, at: int, value: float) -> Term:

@@ -29,9 +29,11 @@ from .screen import screen
 from .settle import TO_STAY
 from .track import Track
 
-__all__ = ["Search", "alike", "reconsidered"]
+__all__ = ["TWENTY_TO_ONE", "Search", "alike", "reconsidered"]
 
-_CLEARLY = 3.0  # statistical, nats: odds of twenty to one; a move that gains less isn't made
+TWENTY_TO_ONE = 3.0
+"""Statistical [nats]: a move that gains less isn't made."""
+
 _LAWS = 2  # of the best by themselves, that are also tried with each other term taken away
 _MOVES = 20  # at most: each one gains, so that the search ends anyway
 _FACTORS = (0.25, 4.0)  # by which values that are not linear are moved, from which everything is fitted again
@@ -97,7 +99,7 @@ class Search:
         if best is None:
             return False
         better = self.score(best[1], slips) - self.score(self.state, slips)
-        if not better > _CLEARLY:
+        if not better > TWENTY_TO_ONE:
             return False
         smaller = len(best[1].fit.model.terms) < len(self.state.fit.model.terms)
         if not (smaller or same) and self.state.left - best[1].left < TO_STAY * self.begin.excess:

@@ -26,6 +26,7 @@ __all__ = [
     "PER_PARAMETER",
     "earns",
     "implausible",
+    "least_gain",
     "mass_off",
     "price_of",
     "strange",
@@ -83,6 +84,16 @@ def worth(state: State, tried: Sequence[Tried], of_excess: float = OF_EXCESS) ->
 
 def earns(state: State, left: float, tried: Sequence[Tried], of_excess: float = OF_EXCESS) -> bool:
     """True when leaving ``left`` is more than what ``tried`` takes off by chance, and the part ``of_excess`` of it all."""
-    gain = state.left - left
-    chance = max((each.by_chance for each in tried), default=0.0)
-    return gain > max(OF_FLOOR * state.floor, of_excess * state.excess, BY_CHANCE * chance)
+    return state.left - left > max(
+        least_gain(state, max((each.by_chance for each in tried), default=0.0)), of_excess * state.excess
+    )
+
+
+def least_gain(state: State, by_chance: float) -> float:
+    """What anything that comes to ``state`` has to take off, however much is missing [F^2].
+
+    Args:
+        state: to which it comes.
+        by_chance: what it takes off a twin, where nothing is missing [F^2].
+    """
+    return max(OF_FLOOR * state.floor, BY_CHANCE * by_chance)

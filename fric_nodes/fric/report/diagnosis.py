@@ -259,15 +259,16 @@ def _limits_section(found: Diagnosis) -> Section:
             each.title,
             "" if each.size is None else f"{'below' if each.softer else 'above'} {significant(each.size, 2)} {each.unit}",
             each.parameter,
-            each.why,
+            f"perhaps as {each.like_title}" if each.like else each.why,
         )
         for each in found.limits
     ]
     note = (
         "The size at which an effect that was not found would have raised the log likelihood of these recordings by "
-        f"{EVIDENCE:g} nats, at first order, beside everything that the model has. Smaller ones may be there."
+        f"{EVIDENCE:g} nats and been a real part of what is missing, at first order, beside everything that the model has. "
+        "Smaller ones may be there."
     )
-    head = ("effect", "would have shown", "parameter", "or why not")
+    head = ("effect", "would have shown", "parameter", "but, or why not")
     return Section("Detection limits", (table(head, rows, text_columns=(0, 1, 2, 3), wrap=(3,)), paragraph(note, "note")))
 
 

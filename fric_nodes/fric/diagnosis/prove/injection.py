@@ -152,7 +152,11 @@ def acting(force: Array) -> Array:
 def can_be_at_limit(limit: Limit) -> bool:
     """True where a limit states a size, and such an effect can be put into the effort."""
     changing = CHANGED.get(limit.effect)
-    return limit.term is not None and (limit.effect in INJECTED if changing is None else limit.parameter == changing.parameter)
+    return (
+        limit.term is not None
+        and not limit.like
+        and (limit.effect in INJECTED if changing is None else limit.parameter == changing.parameter)
+    )
 
 
 def at_limit(records: Sequence[Record], model: Model, limit: Limit, times: float) -> list[Record]:

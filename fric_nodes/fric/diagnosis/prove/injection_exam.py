@@ -53,7 +53,7 @@ class InjectionOutcome:
         rms: root mean square of the added force where it acts [F].
         rest: that of what stays unexplained there in the recordings as they are [F]; None where the size is one of a limit.
         limit: the detection limit of which the size is a multiple, in words; empty where it is one of the rest.
-        presence: of the injected effect; 0 where it isn't named.
+        presence: of the injected effect, or of one as which its limit says that it may be told; 0 where neither is named.
         wrong: effects named with at least :data:`.confidence.AS_LIKELY` that are neither injected nor named in the recordings
             as they are, however surely: what is named there may be the axis's own.
         failure: why there is no diagnosis; empty where there is one.
@@ -133,12 +133,14 @@ class _Plan:
         conceal: recordings to those with it; None where it could not show.
         rest: as of :class:`InjectionOutcome`.
         limit: likewise.
+        like: another effect as which it may be told at its limit; empty where none is.
     """
 
     what: Injected
     conceal: Callable[[Sequence[Record]], list[Record]] | None
     rest: float | None = None
     limit: str = ""
+    like: str = ""
 
 
 def _by_rest(records: Sequence[Record], bare: Diagnosis, wanted: Sequence[Injected]) -> Iterator[_Plan]:
@@ -158,7 +160,7 @@ def _at_limits(bare: Diagnosis) -> Iterator[_Plan]:
             for times in AT_LIMITS:
                 what = Injected(limit.effect, times)
                 conceal = partial(at_limit, model=bare.model, limit=limit, times=times)
-                yield _Plan(what, conceal, limit=limit.stated)
+                yield _Plan(what, conceal, limit=limit.stated, like=limit.like)
 
 
 def told_in(out: Path) -> Iterator[dict[str, Any]]:
@@ -219,7 +221,7 @@ def _added(records: Sequence[Record], changed: Sequence[Record]) -> float:
 def _write(out: Path, plan: _Plan, rms: float, own: Mapping[str, float], failure: str, findings: Sequence[Finding]) -> None:
     """Write down what was said of one."""
     told = {"injected": asdict(plan.what), "rms": rms, "rest": plan.rest, "limit": plan.limit, "own": dict(own)}
-    told |= {"failure": failure, "findings": [*map(_said, findings)]}
+    told |= {"like": plan.like, "failure": failure, "findings": [*map(_said, findings)]}
     at = _at(out, plan.what)
     at.parent.mkdir(parents=True, exist_ok=True)
     write_text(at, json.dumps(told, indent=1))
@@ -235,7 +237,9 @@ def _said(finding: Finding) -> dict[str, Any]:
 def _outcome(told: dict[str, Any]) -> InjectionOutcome:
     what = Injected(**told["injected"])
     sure = {each["effect"]: each["confidence"] for each in reversed(told["findings"])}
-    own = {what.effect, "unknown", *told["own"]}
+    meant = {what.effect, told.get("like") or what.effect}
+    own = meant | {"unknown", *told["own"]}
     wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in own)
-    presence, limit = sure.get(what.effect, 0.0), told.get("limit", "")
+    presence = max(sure.get(effect, 0.0) for effect in meant)
+    limit = told.get("limit", "")
     return InjectionOutcome(what, told["rms"], told["rest"], presence, tuple(sorted(wrong)), told["failure"], limit)
