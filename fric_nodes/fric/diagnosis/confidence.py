@@ -25,6 +25,7 @@ __all__ = [
     "UNEXPLAINED",
     "confidence_of",
     "is_doubtful",
+    "margin",
     "margin_of",
     "unknown_confidence",
 ]
@@ -53,12 +54,24 @@ FAINT = 1.0
 
 def margin_of(step: Step) -> float:
     """Logarithm of what the best rival leaves over what the effect leaves, the price of parameters included."""
-    slack = 0.15 * step.floor + 0.01 * step.missing
     effect_id = step.term.split("#")[0]
     others = [each.score for each in step.rivals if effect_id not in {name.split("#")[0] for name in each.names}]
     rival = min(others, default=step.before)
     own = step.after + step.price
-    return math.log((max(rival - step.floor, 0.0) + slack) / (max(own - step.floor, 0.0) + slack))
+    return margin(rival - step.floor, own - step.floor, step.floor, step.missing)
+
+
+def margin(rival: float, own: float, floor: float, missing: float) -> float:
+    """Logarithm of what a rival leaves over what an effect leaves, of noise and of little differences less.
+
+    Args:
+        rival: what is left with it above the floor [F^2].
+        own: what is left with the effect [F^2].
+        floor: of noise [F^2].
+        missing: above the floor, without either [F^2].
+    """
+    slack = 0.15 * floor + 0.01 * missing
+    return math.log((max(rival, 0.0) + slack) / (max(own, 0.0) + slack))
 
 
 def confidence_of(rest: float, step: Step, share: float) -> float:

@@ -1,13 +1,14 @@
 """How large an effect that was not found would have to be, for these recordings to show it.
 
 An effect of the strength A changes the missing force, at first order, by A c, with c its column on the observer. What the
-fitted parameters can do themselves is taken out of c; E is the energy of the rest and L that of what the model leaves. With N
-independent values the log likelihood would rise by (N / 2) ln(1 + A^2 E / L). The limit is the A at which that is
-:data:`EVIDENCE`, and A^2 E what a term has to take off to be found at all (:mod:`.price`): beyond chance, beyond what the floor
-is known to, and a real part of what is missing. At one and a half of it most such effects are found, at half of it hardly any.
+fitted parameters can do themselves is taken out of c; E is the energy of the rest. The limit is the A at which A^2 E is enough
+for three things: :data:`EVIDENCE`, with the log likelihood that rises by (N / 2) ln(1 + A^2 E / L) where N independent values
+leave L; what a term has to take off to come at all (:mod:`.price`); and that the effect would be said to be as likely there as
+not (:mod:`.expected`), beside what stays unexplained and beside its best rival. At one and a half of the limit most such
+effects are found, at half of it hardly any.
 
-To be named it has to be told from every other effect, too: what the best of these can't do of c must bring twenty to one. Where
-it doesn't at the limit, at first order, the effect shows, but perhaps as that other one.
+Of rivals, what the best of them can't do of c must bring twenty to one. Where it doesn't at the limit, the effect shows, but
+perhaps as that other one.
 
 What the model leaves may hold some of an effect that was not found, because nothing singles it out there. The size at which it
 would take most of that away is added: so much of it may be there already.
@@ -27,6 +28,7 @@ from ..effects import EFFECTS, by_name
 from ..model import ModelError, Term
 from ..record import Array, Units
 from .additive.residual import independent_values
+from .expected import Expected
 from .faint import beyond_chance
 from .fitting import State
 from .moves import TWENTY_TO_ONE
@@ -43,7 +45,6 @@ _NEAR = 1.3  # numerical: so near to the limit the change is about proportional 
 _STEP = 30.0  # numerical: of one step towards the limit
 _ROUNDS = 8  # numerical
 _THE_SAME = "the fitted parameters do the same on these motions"
-_TINY = 1e-12  # numerical
 
 
 @dataclass(frozen=True)
@@ -123,26 +124,22 @@ def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units, 
                 found.append(_none(effect, "these recordings hold nothing by which it could show"))
             else:
                 others = {other: span for other, span in rivals.items() if other != name}
-                search = _Search(track, state, basis, *_energies(track, state, trial, anything), others, units)
+                search = _Search(track, state, basis, _expected(track, state, trial, anything), others, units)
                 found.append(search.linear(trial.column) if trial.column.amplitudes else search.whole(trial.column))
     return tuple(found)
 
 
-def _energies(track: Track, state: State, trial: Tried, anything: bool) -> tuple[float, float]:
-    """What an effect has to take off to be found beside ``state``, and what no rival may take off to be told from it [F^2].
-
-    What hides in the noise is asked for only alone.
-    """
-    residual = state.fit.residual
-    independent = max(independent_values(track, residual), 1.0)
-    found, told = (
-        math.expm1(min(2.0 * nats / independent, 50.0)) * float(residual @ residual) for nats in (EVIDENCE, TWENTY_TO_ONE)
-    )
+def _expected(track: Track, state: State, trial: Tried, anything: bool) -> Expected:
+    """What an effect would come beside; what hides in the noise is asked for only alone."""
+    left, excess = float(state.fit.residual @ state.fit.residual), state.excess
+    independent = max(independent_values(track, state.fit.residual), 1.0)
+    by_nats = math.expm1(min(2.0 * EVIDENCE / independent, 50.0)) * left
     least = least_gain(state, trial.by_chance)
     if not anything:
         least = min(least, beyond_chance(track, state, (trial,)))
     # What an effect takes off is itself missing.
-    return max(found, least, OF_EXCESS / (1.0 - OF_EXCESS) * state.excess), told
+    least = max(by_nats, least, OF_EXCESS / (1.0 - OF_EXCESS) * excess)
+    return Expected(left, state.floor, excess, independent, least)
 
 
 def _beside(basis: Array, column: Column) -> Array:
@@ -161,8 +158,7 @@ class _Search:
         track: the recordings.
         state: the model that was found.
         basis: orthonormal columns of what the fitted parameters do.
-        energy: that an effect is to bring [F^2],
-        told: and of which no rival may bring so much [F^2].
+        beside: what an effect would come beside.
         rivals: orthonormal columns of what each rival does beside the fitted parameters, by its id.
         units: of the model.
     """
@@ -170,48 +166,57 @@ class _Search:
     track: Track
     state: State
     basis: Array
-    energy: float
-    told: float
+    beside: Expected
     rivals: Mapping[str, Array]
     units: Units
 
-    def needed(self, column: Array) -> float | None:
-        """By what a column has to be multiplied; None where the fitted parameters do the same."""
+    def needed(self, effect: Effect, column: Array) -> float | None:
+        """By what a column has to be multiplied; None where the fitted parameters do the same, or no size is enough."""
         own = self.own(column)
-        return None if own <= max(OWN**2 * float(column @ column), _TINY) else math.sqrt(self.energy / own)
+        if own <= OWN**2 * float(column @ column):
+            return None
+        _, apart = self.rival(column)
+        energy = self.beside.needed(effect.id, apart)
+        return None if energy is None else math.sqrt(energy / own)
 
-    def like(self, column: Array) -> str:
-        """Id of the rival that does most of a column, where it can't be told from that at its limit; else empty."""
-        beside = self.beside(column)
-        own = float(beside @ beside)
-        left = {name: own - float(np.sum((span.T @ beside) ** 2)) for name, span in self.rivals.items()}
+    def rival(self, column: Array) -> tuple[str, float]:
+        """Id of the rival that does most of a column, and the part of its energy that this leaves, 0 to 1."""
+        own = self.apart(column)
+        energy = float(own @ own)
+        left = {name: 1.0 - float(np.sum((span.T @ own) ** 2)) / energy for name, span in self.rivals.items()}
         name = min(left, key=lambda each: left[each], default="")
-        return name if name and left[name] * self.energy < self.told * own else ""
+        return name, max(left[name], 0.0) if name else 1.0
+
+    def like(self, effect: Effect, column: Array) -> str:
+        """Id of the rival that does most of a column, where it can't be told from that at its limit; else empty."""
+        name, apart = self.rival(column)
+        energy = self.beside.needed(effect.id, apart)
+        return name if energy is not None and self.beside.nats(apart * energy) < TWENTY_TO_ONE else ""
 
     def own(self, column: Array) -> float:
         """Energy of what the fitted parameters can't do of a column [F^2]."""
-        beside = self.beside(column)
-        return float(beside @ beside)
+        own = self.apart(column)
+        return float(own @ own)
 
-    def beside(self, column: Array) -> Array:
+    def apart(self, column: Array) -> Array:
         """What the fitted parameters can't do of a column [F]."""
         return np.asarray(column - self.basis @ (self.basis.T @ column))
 
     def hidden(self, column: Array) -> float:
         """How many times a column is in what the model leaves; negative for its opposite."""
-        return -float(self.beside(column) @ self.state.fit.residual) / self.own(column)
+        return -float(self.apart(column) @ self.state.fit.residual) / self.own(column)
 
     def linear(self, column: Column) -> Limit:
         """Of an effect whose force grows in proportion to its amplitude."""
         effect = column.term.effect
-        needed = self.needed(column.parts[0])
+        needed = self.needed(effect, column.parts[0])
         if needed is None:
             return _none(effect, _THE_SAME)
         strength = column.amplitudes[0]
         size = needed + abs(self.hidden(column.parts[0]))
         others = dict.fromkeys(column.amplitudes, 0.0)
         values = column.term.by_name | others | {strength: size}
-        like = self.like(column.parts[0])
+        like = self.like(effect, column.parts[0])
         return self._stated(Term(effect, tuple(values.values())), strength, softer=False, like=like)
 
     def whole(self, column: Column) -> Limit:
@@ -223,14 +228,14 @@ class _Search:
         if declared.dimension == "F" and held.effect.neutral is None:
             return _none(held.effect, "shows only where the command goes beyond it")
         softer = declared.dimension in ("F/x", "1/s")
-        needed = self.needed(change)
+        needed = self.needed(held.effect, change)
         for _ in range(_ROUNDS):
             if needed is None or not math.isfinite(needed) or value == 0.0:
                 return _none(held.effect, _THE_SAME)
             if 1.0 / _NEAR < needed < _NEAR:
                 times = needed + max(self.hidden(change), 0.0)
                 size = value / times if softer else value * times
-                like = self.like(change)
+                like = self.like(held.effect, change)
                 return self._stated(_with(held, at, size), declared.name, softer=softer, like=like)
             by = min(max(needed, 1.0 / _STEP), _STEP)
             value = value / by if softer else value * by
@@ -240,7 +245,7 @@ class _Search:
             except ModelError:
                 break
             change = self.track.residual(grown) - self.state.fit.residual
-            needed = self.needed(change)
+            needed = self.needed(held.effect, change)
         return _none(held.effect, "no size was found at which it begins to show")
 
     def _stated(self, held: Term, strength: str, *, softer: bool, like: str) -> Limit:
