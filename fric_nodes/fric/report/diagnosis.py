@@ -264,8 +264,9 @@ def _limits_section(found: Diagnosis) -> Section:
         for each in found.limits
     ]
     note = (
-        "The size at which an effect that was not found would have been named with 50 %, at first order, beside everything that "
-        f"the model has and leaves, and with a log likelihood that rises by {EVIDENCE:g} nats at least. Smaller ones may be there."
+        "The size at which an effect that was not found would have been named with 50 %, at first order, beside everything "
+        f"that the model has and leaves, and where the log likelihood rises by {EVIDENCE:g} nats at least. Smaller ones may "
+        "be there."
     )
     head = ("effect", "would have shown", "parameter", "but, or why not")
     return Section("Detection limits", (table(head, rows, text_columns=(0, 1, 2, 3), wrap=(3,)), paragraph(note, "note")))
