@@ -83,6 +83,17 @@ def test_what_acts_alike_on_these_motions_is_named_with_the_limit(limits: dict[s
     assert limits["ripple"].sentence.endswith("(cosine)")
 
 
+def test_a_recording_without_any_noise_has_limits_too() -> None:
+    t = H * np.arange(3000)
+    moved = fric.simulate(NOMINAL, 30.0 * np.sin(2.0 * np.pi * (0.3 + 0.06 * t) * t), period=H)
+    track, state = followed(moved)
+    exact = replace(state, fit=replace(state.fit, solution=replace(state.fit.solution, residual=0.0 * state.fit.residual)))
+    tried = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False).tried
+    found = {each.effect: each for each in limits_of(track, exact, tried, Units(), anything=False)}
+    assert found["ripple"].size is not None
+    assert 0.0 <= found["ripple"].size < 0.1
+
+
 def test_what_is_not_recorded_has_no_limit_and_says_why(limits: dict[str, Limit]) -> None:
     assert limits["temperature"].size is None
     assert "hold nothing" in limits["temperature"].why

@@ -131,14 +131,14 @@ def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units, 
 
 def _expected(track: Track, state: State, trial: Tried, anything: bool) -> Expected:
     """What an effect would come beside; what hides in the noise is asked for only alone."""
-    left, excess = float(state.fit.residual @ state.fit.residual), state.excess
+    left, excess = max(float(state.fit.residual @ state.fit.residual), 1e-300), state.excess
     independent = max(independent_values(track, state.fit.residual), 1.0)
     by_nats = math.expm1(min(2.0 * EVIDENCE / independent, 50.0)) * left
     least = least_gain(state, trial.by_chance)
     if not anything:
         least = min(least, beyond_chance(track, state, (trial,)))
     # What an effect takes off is itself missing.
-    least = max(by_nats, least, OF_EXCESS / (1.0 - OF_EXCESS) * excess)
+    least = max(by_nats, least, OF_EXCESS / (1.0 - OF_EXCESS) * excess, 1e-300)
     return Expected(left, state.floor, excess, independent, least)
 
 

@@ -245,7 +245,7 @@ def _probability(nats: float) -> float:
 def independent_share(residual: Array) -> float:
     """Independent rows over rows: one over one plus twice the sum of the autocorrelations until they first are not positive."""
     centred = residual - np.mean(residual)
-    power = float(centred @ centred)
+    power = max(float(centred @ centred), 1e-300)  # of a recording without any noise nothing may be left
     total = 1.0
     for lag in range(1, min(residual.shape[0] // 4, 200)):
         rho = float(centred[lag:] @ centred[:-lag]) / power
