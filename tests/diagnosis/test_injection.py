@@ -93,7 +93,7 @@ def test_the_axis_with_a_multiple_of_the_limit_moves_the_same_under_the_changed_
     plain = replace(fric.simulate(NOMINAL, force, period=H), effort=force)
     ((name, value),) = strength.items()
     limit = Limit(effect, "", name, value, False, "", "", "", term(effect, **strength, **others))
-    assert can_be_at_limit(limit)
+    assert can_be_at_limit(limit, 1.5)
     (changed,) = at_limit([plain], NOMINAL, limit, 1.5)
     axis = NOMINAL.with_terms((*NOMINAL.terms, term(effect, **{name: 1.5 * value}, **others)))
     moved = fric.simulate(axis, changed.effort, period=H)
@@ -103,11 +103,14 @@ def test_the_axis_with_a_multiple_of_the_limit_moves_the_same_under_the_changed_
 
 
 def test_what_cant_be_put_into_the_effort_at_its_limit_is_left_out() -> None:
-    assert not can_be_at_limit(Limit("stribeck", "", "", None, False, "", "the fitted parameters do the same"))
+    assert not can_be_at_limit(Limit("stribeck", "", "", None, False, "", "the fitted parameters do the same"), 0.5)
     backlash = term("backlash", gap=1e-5)
-    assert not can_be_at_limit(Limit("backlash", "", "gap", 1e-5, False, "m", "", "", backlash))
+    assert not can_be_at_limit(Limit("backlash", "", "gap", 1e-5, False, "m", "", "", backlash), 0.5)
+    gear = term("gear_friction", coefficient=0.7)
+    assert can_be_at_limit(Limit("gear_friction", "", "coefficient", 0.7, False, "1", "", "", gear), 0.5)
+    assert not can_be_at_limit(Limit("gear_friction", "", "coefficient", 0.7, False, "1", "", "", gear), 1.5)
     directional = term("gear_friction", "directional", driving=0.1, driven=0.05)
-    assert not can_be_at_limit(Limit("gear_friction", "", "driving", 0.1, False, "1", "", "", directional))
+    assert not can_be_at_limit(Limit("gear_friction", "", "driving", 0.1, False, "1", "", "", directional), 0.5)
 
 
 def test_recordings_at_one_speed_each_are_refused(record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -130,7 +130,7 @@ def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units, 
 
 
 def _expected(track: Track, state: State, trial: Tried, anything: bool) -> Expected:
-    """What an effect would come beside; what hides in the noise is asked for only alone."""
+    """What an effect would come beside; one that is weak beside the noise is looked for only where nothing was found."""
     left, excess = max(float(state.fit.residual @ state.fit.residual), 1e-300), state.excess
     independent = max(independent_values(track, state.fit.residual), 1.0)
     by_nats = math.expm1(min(2.0 * EVIDENCE / independent, 50.0)) * left

@@ -266,7 +266,7 @@ def _limits_section(found: Diagnosis) -> Section:
     note = (
         "The size at which an effect that was not found would have been named with 50 %, at first order, beside everything "
         f"that the model has and leaves, and where the log likelihood rises by {EVIDENCE:g} nats at least. Smaller ones may "
-        "be there."
+        "be there, or show as something unknown."
     )
     head = ("effect", "would have shown", "parameter", "but, or why not")
     return Section("Detection limits", (table(head, rows, text_columns=(0, 1, 2, 3), wrap=(3,)), paragraph(note, "note")))

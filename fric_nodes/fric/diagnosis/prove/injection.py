@@ -149,14 +149,14 @@ def acting(force: Array) -> Array:
     return np.asarray(size > _ACTS * np.max(size))
 
 
-def can_be_at_limit(limit: Limit) -> bool:
-    """True where a limit states a size, and such an effect can be put into the effort."""
+def can_be_at_limit(limit: Limit, times: float) -> bool:
+    """True where an effect can be put into the effort with ``times`` the size that its detection limit states."""
     changing = CHANGED.get(limit.effect)
-    return (
-        limit.term is not None
-        and not limit.like
-        and (limit.effect in INJECTED if changing is None else limit.parameter == changing.parameter)
-    )
+    known = limit.effect in INJECTED if changing is None else limit.parameter == changing.parameter
+    if limit.term is None or not known:
+        return False
+    declared = next(each for each in limit.term.effect.parameters if each.name == limit.parameter)
+    return declared.lower <= times * limit.term.by_name[limit.parameter] <= declared.upper
 
 
 def at_limit(records: Sequence[Record], model: Model, limit: Limit, times: float) -> list[Record]:

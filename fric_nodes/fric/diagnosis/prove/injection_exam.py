@@ -156,11 +156,12 @@ def _by_rest(records: Sequence[Record], bare: Diagnosis, wanted: Sequence[Inject
 def _at_limits(bare: Diagnosis) -> Iterator[_Plan]:
     """Every effect with a detection limit that can be put into the effort, above it and below."""
     for limit in bare.limits:
-        if can_be_at_limit(limit):
+        # What a law's bounds allow at half of the limit they may not allow above it: a gear that loses all of its force.
+        if can_be_at_limit(limit, AT_LIMITS[-1]):
             for times in AT_LIMITS:
-                what = Injected(limit.effect, times)
                 conceal = partial(at_limit, model=bare.model, limit=limit, times=times)
-                yield _Plan(what, conceal, limit=limit.stated, like=limit.like)
+                what, can = Injected(limit.effect, times), can_be_at_limit(limit, times)
+                yield _Plan(what, conceal if can else None, limit=limit.stated, like=limit.like)
 
 
 def told_in(out: Path) -> Iterator[dict[str, Any]]:
