@@ -146,6 +146,8 @@ def client_of(workers: Workers) -> Iterator[Any]:
         # half of the time of a worker.
         "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 8 * _KEPT,
         "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": _KEPT,
+        # A profile of each second would be kept for an hour, which is more memory than all the work takes.
+        "distributed.worker.profile.enabled": False,
         "distributed.admin.tick.limit": "60s",
     }
     with dask.config.set(settings), ExitStack() as stack:
