@@ -83,6 +83,12 @@ def test_what_acts_alike_on_these_motions_is_named_with_the_limit(limits: dict[s
     assert limits["ripple"].sentence.endswith("(cosine)")
 
 
+def test_the_limit_of_a_drive_shows_the_more_the_lower_it_is(limits: dict[str, Limit]) -> None:
+    saturation = limits["saturation"]
+    # The force reaches 42 N: a drive that is limited far above does nothing.
+    assert (saturation.softer and 0.0 < (saturation.size or 0.0) < 42.0) or "command goes beyond" in saturation.why
+
+
 def test_a_recording_without_any_noise_has_limits_too() -> None:
     t = H * np.arange(3000)
     moved = fric.simulate(NOMINAL, 30.0 * np.sin(2.0 * np.pi * (0.3 + 0.06 * t) * t), period=H)

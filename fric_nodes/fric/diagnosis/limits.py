@@ -44,6 +44,7 @@ EVIDENCE = 10.0
 _NEAR = 1.3  # numerical: so near to the limit the change is about proportional to the size
 _STEP = 30.0  # numerical: of one step towards the limit
 _ROUNDS = 8  # numerical
+_BEYOND = "shows only where the command goes beyond it"
 _THE_SAME = "the fitted parameters do the same on these motions"
 
 
@@ -56,7 +57,7 @@ class Limit:
         title: in a sentence.
         parameter: that says how strong it is; empty where no size can be stated.
         size: the smallest that would have been found, or, where ``softer``, the largest stiffness [SI].
-        softer: True where the effect grows as the parameter falls, as with a stiffness in series.
+        softer: True where the effect grows as the parameter falls, as with a stiffness in series or the limit of a drive.
         unit: of the size.
         why: no size can be stated; empty where one is.
         like: id of another effect that does nearly the same on these motions, so that it may be told as that; empty: none.
@@ -226,12 +227,13 @@ class _Search:
         at = names.index((held.effect.amplitudes or tuple(names))[0])
         declared, value, change = held.effect.parameters[at], held.values[at], column.parts[0]
         if declared.dimension == "F" and held.effect.neutral is None:
-            return _none(held.effect, "shows only where the command goes beyond it")
-        softer = declared.dimension in ("F/x", "1/s")
+            return _none(held.effect, _BEYOND)
+        limits = held.effect.absent.get(declared.name, 0.0) > value
+        softer = limits or declared.dimension in ("F/x", "1/s")
         needed = self.needed(held.effect, change)
         for _ in range(_ROUNDS):
             if needed is None or not math.isfinite(needed) or value == 0.0:
-                return _none(held.effect, _THE_SAME)
+                return _none(held.effect, _BEYOND if limits else _THE_SAME)
             if 1.0 / _NEAR < needed < _NEAR:
                 times = needed + max(self.hidden(change), 0.0)
                 size = value / times if softer else value * times
