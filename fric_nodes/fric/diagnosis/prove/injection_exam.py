@@ -207,6 +207,9 @@ def _diagnosed(
     try:
         changed = plan.conceal(records)
         rms = _added(records, changed)
+        if rms == 0.0:
+            _write(Path(out), plan, rms, own, CANNOT_SHOW, ())
+            return
         findings = diagnose(*in_blocks(changed, n_blocks), nominal, at_most=at_most).findings
     except InputError as error:
         failure = str(error)
@@ -216,7 +219,7 @@ def _diagnosed(
 def _added(records: Sequence[Record], changed: Sequence[Record]) -> float:
     """Root mean square of what is concealed, where it acts [F]."""
     added = np.concatenate([new.effort - old.effort for old, new in zip(records, changed, strict=True)])
-    return float(np.sqrt(np.mean(added[acting(added)] ** 2)))
+    return float(np.sqrt(np.mean(added[acting(added)] ** 2))) if np.any(added) else 0.0
 
 
 def _write(out: Path, plan: _Plan, rms: float, own: Mapping[str, float], failure: str, findings: Sequence[Finding]) -> None:
@@ -238,9 +241,10 @@ def _said(finding: Finding) -> dict[str, Any]:
 def _outcome(told: dict[str, Any]) -> InjectionOutcome:
     what = Injected(**told["injected"])
     sure = {each["effect"]: each["confidence"] for each in reversed(told["findings"])}
-    meant = {what.effect, told.get("like") or what.effect}
-    own = meant | {"unknown", *told["own"]}
-    wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in own)
+    # What is named in the recordings as they are says nothing of what was concealed.
+    meant = {what.effect} | ({told.get("like", "")} - set(told["own"]))
+    known = meant | {"unknown", *told["own"]}
+    wrong = (effect for effect, c in sure.items() if c >= AS_LIKELY and effect not in known)
     presence = max(sure.get(effect, 0.0) for effect in meant)
     limit = told.get("limit", "")
     return InjectionOutcome(what, told["rms"], told["rest"], presence, tuple(sorted(wrong)), told["failure"], limit)
