@@ -100,7 +100,8 @@ def _diagnosed(train: Sequence[Record], validation: Sequence[Record], nominal: M
     train, validation = ([replace(record, nominal=conditions) for record in held] for held in (train, validation))
     tell("refitting the nominal model")
     train, validation = ([evened(record) for record in held] for held in (train, validation))
-    corrected += [f"{record.source}: {note}" for record in (*train, *validation) for note in record.notes if "jitter" in note]
+    jitter = [f"{record.source}: {note}" for record in (*train, *validation) for note in record.notes if "jitter" in note]
+    corrected += dict.fromkeys(jitter)  # parts of one recording may say the same
     tracks, start = started(nominal, train)
     refuse_other_plant(train, tracks[0], start)
     corrected += held_as(tracks[0])

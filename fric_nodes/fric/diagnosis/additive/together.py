@@ -70,8 +70,12 @@ def grown_together(
         whole = _fitted(track, state, offered, tell)
         partial = beside_unknown or whole.excess > max(LITTLE * begin.excess, CLEARLY * whole.floor)
         weighed = _beside_functions(track) if partial else _by_unseen_blocks(track, independent)
+        worth = 0.0 if partial else _GAIN
         grown = _pruned(track, whole, begin, weighed, tell)
-        if _nats(state.left, grown.left, independent) < (0.0 if partial else _GAIN) or _same(state, grown):
+        if _nats(state.left, grown.left, independent) < worth and added(grown.fit.model, state.fit.model):
+            # A term that came before has gone for others that don't make up for it: it stays, and they have to help beside it.
+            grown = _pruned(track, whole, state, weighed, tell)
+        if _nats(state.left, grown.left, independent) < worth or _same(state, grown):
             break
         tell(f"leaves {100.0 * grown.excess / max(begin.excess, 1e-300):.0f} % of what was missing")
         state = grown
