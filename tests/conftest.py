@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
 import pytest
+from fric.threads import keep_linear_algebra_in_one
 from hypothesis import HealthCheck, settings
 
 # How long it takes to draw an example says more about what else the machine does than about what is tested.
@@ -47,6 +48,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    keep_linear_algebra_in_one()  # as every command and node does; several tests run at a time
     config.stash[_STDERR] = os.fdopen(os.dup(2), "w")  # while it isn't captured yet
     config.addinivalue_line("markers", "alone: measures time, or runs in it: no other test at the same time")
     for name, kind in _KINDS.items():

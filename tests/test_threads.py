@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fric.errors import InputError
-from fric.threads import alone, linear_algebra_in_one, mapped, n_threads
+from fric.threads import alone, keep_linear_algebra_in_one, linear_algebra_in_one, mapped, n_threads
 from threadpoolctl import threadpool_info
 
 
@@ -70,6 +70,24 @@ def test_a_process_among_others_uses_one_thread() -> None:
         assert pool.submit(np.linalg.norm, np.ones(3)).result() == pytest.approx(np.sqrt(3.0))
         assert pool.submit(n_threads).result() == 1
         assert set(of_linear_algebra(pool.submit(threadpool_info).result())) == {1}
+
+
+def test_a_process_keeps_linear_algebra_in_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), initializer=keep_linear_algebra_in_one) as pool:
+        assert pool.submit(np.linalg.norm, np.ones(3)).result() == pytest.approx(np.sqrt(3.0))
+        assert pool.submit(n_threads).result() == n_threads()  # those that follow recordings are others
+        assert set(of_linear_algebra(pool.submit(threadpool_info).result())) == {1}
+
+
+def test_who_says_how_many_threads_linear_algebra_has_gets_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("MKL_NUM_THREADS", "OMP_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), initializer=keep_linear_algebra_in_one) as pool:
+        assert pool.submit(os.getenv, "OPENBLAS_NUM_THREADS").result() == "2"
+        assert pool.submit(os.getenv, "OMP_NUM_THREADS").result() is None
 
 
 _PARENT = """

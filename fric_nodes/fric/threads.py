@@ -7,6 +7,7 @@ the linear algebra between them is small, and threads of its own would only take
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -19,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from .errors import InputError
 
-__all__ = ["alone", "end_with_parent", "linear_algebra_in_one", "mapped", "n_threads"]
+__all__ = ["alone", "end_with_parent", "keep_linear_algebra_in_one", "linear_algebra_in_one", "mapped", "n_threads"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -100,3 +101,17 @@ def linear_algebra_in_one() -> Iterator[None]:
     """While it lasts, linear algebra uses the calling thread alone."""
     with threadpool_limits(1, user_api="blas"):
         yield
+
+
+def keep_linear_algebra_in_one() -> None:
+    """Make linear algebra use one thread in this process and in those that it starts, unless the environment says how many.
+
+    The matrices here are small. With other work on the machine, the threads that share one wait for each other, and that may
+    take some hundred times as long as what they compute.
+    """
+    if any(name in os.environ for name in _OF_LIBRARIES):
+        return
+    for name in _OF_LIBRARIES:
+        os.environ[name] = "1"  # for libraries that are loaded later
+    if "numpy" in sys.modules:
+        threadpool_limits(1, user_api="blas")  # for those that are there

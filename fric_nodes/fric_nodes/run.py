@@ -18,6 +18,7 @@ from types import FrameType
 
 import rclpy
 from fric.errors import InputError
+from fric.threads import keep_linear_algebra_in_one
 from rclpy.signals import SignalHandlerOptions
 
 from .arguments import check_arguments, help_text, params_files
@@ -61,6 +62,7 @@ def run(kind: Callable[..., FricNode], args: list[str] | None = None) -> None:
     parameters.
     """
     stop = _Stop()
+    keep_linear_algebra_in_one()
     name = re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__.removesuffix("Node")).lower()
     try:
         args = sys.argv if args is None else args

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from fric.diagnosis.additive import together as growing
 from fric.diagnosis.at_once import by_parts, helped, surpassing, together
-from fric.diagnosis.fitting import refit
+from fric.diagnosis.fitting import State, refit
 from fric.diagnosis.growth import Growth
 from fric.diagnosis.settle import Step
 from fric.diagnosis.track import Track
@@ -96,6 +98,32 @@ def test_it_surpasses_what_leaves_more_to_a_fast_observer_and_nothing_else(track
 def test_what_growing_together_came_to_is_not_helped_once_more(tracks: list[Track], proposed: Growth) -> None:
     """At the observer that was the fastest it would come to the same."""
     assert helped([proposed.track], proposed, quietly) is proposed
+
+
+def test_what_came_before_does_not_go_for_what_does_not_make_up_for_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Drag has come; ripple helps beside it. Flexible functions that could be the drag, too, speak against its law alone."""
+    beside_functions = growing._beside_functions
+
+    def against_drag(track: Track) -> growing.Weighed:
+        def of(state: State) -> Callable[[int], tuple[float, Model]]:
+            weigh = beside_functions(track)(state)
+
+            def weighed(place: int) -> tuple[float, Model]:
+                nats, without = weigh(place)
+                return (-1.0 if state.fit.model.prefixes[place] == "quadratic_drag" else nats), without
+
+            return weighed
+
+        return of
+
+    monkeypatch.setattr(growing, "_beside_functions", against_drag)
+    track = followed(DRAG, term("ripple", cosine=0.5, sine=0.0, period=0.03))[1]
+    begin, state = refit(track, NOMINAL), refit(track, with_terms(DRAG))
+    end = growing.grown_together(track, begin, quietly, beside_unknown=True, state=state)
+    assert {"quadratic_drag", "ripple"} <= set(end.fit.model.prefixes)
+    assert end.left < state.left
 
 
 def test_where_nothing_helps_the_growth_stays_what_it_is() -> None:

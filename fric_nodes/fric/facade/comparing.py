@@ -12,6 +12,7 @@ from ..diagnosis.compare import compare as _compare
 from ..files import write_text
 from ..identification.screen import screened
 from ..report.kind import page_of
+from ..threads import linear_algebra_in_one
 from .reading import records_of
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ class Compared:
         return list(texts)
 
 
+@linear_algebra_in_one()
 def compare(simulated: Source, real: Source) -> Compared:
     """Align two recordings of one joint in time, and say by how much and where they differ.
 

@@ -19,6 +19,7 @@ from ..method_settings import parsed, set_values
 from ..model import Model
 from ..model_file import write_model
 from ..report.kind import page_of
+from ..threads import linear_algebra_in_one
 from .reading import records_of
 from .structure import ModelLike, to_fit
 
@@ -111,6 +112,7 @@ class Identified:
         return [out / name for name in ("model.yaml", *texts, "report.html")]
 
 
+@linear_algebra_in_one()
 def identify(
     train: Source | Iterable[Source],
     model: ModelLike = "coulomb,viscous,bias",

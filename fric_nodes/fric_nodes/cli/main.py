@@ -62,6 +62,9 @@ def verbs() -> dict[str, tuple[str, str]]:
 @cache
 def _loaded(name: str) -> Any:
     """The command of a verb, which is imported for it."""
+    from fric.threads import keep_linear_algebra_in_one  # not for the list of verbs: it takes time to import
+
+    keep_linear_algebra_in_one()
     app = typer.Typer(rich_markup_mode="rich")
     module = verbs()[name][0]
     try:
