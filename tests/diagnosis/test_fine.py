@@ -44,6 +44,8 @@ def test_noise_has_no_lines(seen: float, seed: int) -> None:
 def test_an_axis_that_hardly_moves_has_none() -> None:
     assert fine_periods(np.full(100, 0.3), np.ones(100), 24.0, 400.0) == []
     assert fine_periods(np.linspace(0.0, 1.0, 100), np.ones(100), 24.0, 30.0) == []
+    moved = np.linspace(0.0, 1.0, 100)
+    assert fine_periods(moved, np.sin(30.0 * moved), 0.4, 0.8) == []  # less than a cycle is seen
 
 
 @pytest.mark.long

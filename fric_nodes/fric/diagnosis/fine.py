@@ -36,7 +36,7 @@ def fine_periods(position: Array, missing: Array, fewest: float, most: float) ->
     travel = float(np.ptp(position))
     # Coarser periods, too, tell the level: it is known where hardly more than the fewest cycles are seen.
     cycles = np.arange(1.0, min(most, _MOST), _STEP)
-    if travel == 0.0 or float(np.ptp(missing)) == 0.0 or most <= fewest:
+    if cycles.size == 0 or travel == 0.0 or float(np.ptp(missing)) == 0.0 or most <= fewest:
         return []
     phase = -2j * math.pi * (position - float(np.mean(position))) / travel
     turning, turn = (missing - np.mean(missing)) * np.exp(phase * cycles[0]), np.exp(phase * _STEP)
