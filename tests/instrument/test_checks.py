@@ -129,6 +129,31 @@ def test_velocity(clean: Record) -> None:
     assert finding.value == pytest.approx(0.02, abs=1e-3)
 
 
+def test_a_velocity_that_is_repeated_is_still_that_of_the_position(clean: Record) -> None:
+    """Read by a loop that gets a new value of the drive every 80 ms, and the position at other times."""
+    assert clean.velocity is not None
+    stale = np.arange(clean.n_samples)
+    last = stale - stale % 80
+    finding = found(
+        "velocity_signal", replace(clean, velocity=clean.velocity[last], position=clean.position[last - last % 120])
+    )
+    assert finding.verdict == "warning"
+    assert "only below" in finding.detail
+    other = np.random.default_rng(4).standard_normal(clean.n_samples)
+    finding = found("velocity_signal", replace(clean, velocity=other))
+    assert finding.verdict == "warning"
+    assert "not that of the position" in finding.detail
+
+
+def test_a_sign_that_a_velocity_does_not_tell(clean: Record) -> None:
+    other = np.random.default_rng(4).standard_normal(clean.n_samples)
+    finding = found("position_sign", replace(clean, reference=None, velocity=other))
+    assert finding.verdict == "unknown"
+    assert "hardly moves with it" in finding.detail
+    finding = found("position_sign", replace(clean, reference=None, velocity=None))
+    assert finding.detail == "neither a reference nor a velocity was recorded"
+
+
 def test_offset(clean: Record) -> None:
     finding = found("offset", replace(clean, effort=clean.effort + 6.0))
     assert finding.verdict == "warning"
@@ -165,6 +190,17 @@ def test_stamps(clean: Record) -> None:
     repeats = found("stamps", replace(clean, position=clean.position[last], effort=clean.effort[last]))
     assert repeats.verdict == "fault"
     assert repeats.value == pytest.approx(0.1, abs=0.03)
+
+
+def test_samples_that_were_read_unevenly_are_not_missing(clean: Record) -> None:
+    steps = np.random.default_rng(5).exponential(20.0, clean.n_samples // 25) + 3.0
+    at = np.cumsum(steps.astype(int))
+    at = at[at < clean.n_samples]
+    finding = found("stamps", Record(clean.time[at], clean.position[at], clean.effort[at]))
+    assert finding.verdict == "warning"
+    assert "read unevenly" in finding.detail
+    assert "missing" not in finding.detail
+    assert finding.value == 0.0
 
 
 def test_steps(clean: Record) -> None:

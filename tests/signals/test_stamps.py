@@ -58,6 +58,41 @@ def test_a_motion_that_was_read_late_follows_its_stamps(even: Array, jitter: flo
     assert float(np.std(uniform.position - true)) < 0.05 * 0.25 * jitter
 
 
+@pytest.mark.parametrize("noise", [1e-6, 1e-5, 5e-5])
+@pytest.mark.parametrize("followed", [0.0, 1.0])
+def test_noise_of_the_position_favours_neither(even: Array, noise: float, followed: float) -> None:
+    rng = np.random.default_rng(6)
+    late = rng.uniform(0.0, 9e-4, N)
+    given = record(even + late, even + followed * late)
+    given = replace(given, position=given.position + noise * rng.standard_normal(N))
+    found = jitter_of(given, grid_of(given.time))
+    assert abs(found.share - followed) < 4.0 * found.error + 0.05
+
+
+def test_samples_that_were_read_unevenly_are_left_where_they_are() -> None:
+    """A loop that takes 15 to 100 ms, as over a serial line; the axis sticks and slips."""
+    rng = np.random.default_rng(7)
+    stamps = np.cumsum(0.015 + rng.exponential(0.02, 3000))
+    given = Record(
+        stamps - stamps[0], 0.06 * np.floor(stamps / 1.3) + 0.06 * np.clip(np.mod(stamps, 1.3) / 0.4, 0.0, 1.0), stamps
+    )
+    grid = grid_of(given.time)
+    assert grid.spread > grid.period
+    assert jitter_of(given, grid).follows
+    assert evened(given) is given
+
+
+def test_where_the_motion_says_nothing_steps_that_make_up_for_each_other_are_jitter(even: Array) -> None:
+    rng = np.random.default_rng(8)
+    late = even + rng.uniform(0.0, 9e-4, N)
+    mended = evened(Record(late - late[0], np.zeros(N), even))
+    assert mended.is_uniform(1e-9)
+    assert "the motion doesn't decide it" in mended.notes[-1]
+    unevenly = np.cumsum(rng.uniform(5e-4, 1.5e-3, N))
+    given = Record(unevenly - unevenly[0], np.zeros(N), even)
+    assert evened(given) is given
+
+
 def test_lost_samples_are_counted_whatever_the_jitter(even: Array) -> None:
     rng = np.random.default_rng(3)
     kept = np.sort(rng.permutation(N)[: N - 60])

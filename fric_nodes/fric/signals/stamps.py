@@ -9,11 +9,14 @@ a stamp that is late leaves what follows where it was. The line through (n_k, t_
 then within one step of the rounding of it. They may repeat, and are recognised before anything asks that time grows; so are
 those of a counter that starts again, after 2^n of its units or once an hour or a day.
 
-**Whose the jitter is.** With d_k = stamp - grid and the motion f, the recorded position is
-q_k = f(grid_k) + beta v_k d_k + e_k,
-where beta is 0 if the position was read evenly and only its stamp is late, and 1 if it was read when the stamp was taken.
-Fourth differences D take f away: beta = <D q, D(v d)> / <D(v d), D(v d)>. Where that is surely nearer to one, the stamps
-are right and stay; else the grid is taken.
+**Whose the jitter is.** From sample k to k + m the motion goes on by the same share of its way from k - m to k + 2 m as time
+does, but for its curvature. That share is r by the stamps and g by the grid. With Q the way from k - m to k + 2 m,
+q_{k+m} - q_k - Q g = beta Q (r - g) + e_k,
+where beta is 0 if the position was read evenly and only its stamp is late, and 1 if it was read when the stamp was taken; e has
+none of the noise of q_k and q_{k+m} in common with Q, so that noise favours neither. Least squares gives beta, for the lag m at
+which it is known best. Where that is surely nearer to one, the stamps are right and stay; where it is surely not, the grid is
+taken. Where the motion doesn't decide, the stamps do: one that is late is followed by a shorter step, so that neighbouring
+steps are correlated by -1/2. Steps that don't make up for each other are those of samples that were read unevenly.
 """
 
 from __future__ import annotations
@@ -23,15 +26,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import median_filter
 
-from ..record import Array, Mask, Record
+from ..record import Array, Record
 from .resolution import step_of
 
-__all__ = ["Grid", "Jitter", "evened", "grid_of", "jitter_of", "rounded_grid", "unwrapped_stamps"]
+__all__ = ["Grid", "Jitter", "evened", "grid_of", "is_jitter", "jitter_of", "rounded_grid", "unwrapped_stamps"]
 
 _BASE = 64  # samples over which a slope tells the period
 _LOST = 1.5  # periods: a longer step may have lost a sample
 _BESIDE = (7, 25, 25)  # samples on either side that tell where the stamps go on: few while losses near by are not known yet
-_DIFFERENCES = 4
+_LAGS = (1, 2, 4, 8)  # samples: a clock that wanders shows over several
+_FEWEST = 40  # comparisons that tell anything
 _EVEN = 1e-3  # of a period: stamps that are evener are left as they are
 _SURE = 1.645  # standard errors: 90 % two-sided
 _HALF = 0.5
@@ -91,8 +95,13 @@ class Jitter:
 
     @property
     def follows(self) -> bool:
-        """True where the position was read when its stamp was taken."""
+        """True where the position was surely read when its stamp was taken."""
         return self.share - _SURE * self.error > _HALF
+
+    @property
+    def is_even(self) -> bool:
+        """True where the position was surely read evenly."""
+        return self.share + _SURE * self.error < _HALF
 
 
 def _period(time: Array) -> float:
@@ -181,41 +190,45 @@ def rounded_grid(time: Array) -> tuple[Array, float] | None:
 
 def jitter_of(record: Record, grid: Grid) -> Jitter:
     """Whether the motion of ``record`` follows its stamps or the grid."""
-    nothing = Jitter(float("nan"), float("inf"))
-    if record.n_samples < 10 * _DIFFERENCES or grid.period <= 0.0:
+    if grid.period <= 0.0:
+        return Jitter(float("nan"), float("inf"))
+    return min((_followed(record, grid, lag) for lag in _LAGS), key=lambda each: each.error)
+
+
+def _followed(record: Record, grid: Grid, lag: int) -> Jitter:
+    """The same by the motion over ``lag`` samples, where none is lost or invalid in the samples beside these."""
+    nothing, n = Jitter(float("nan"), float("inf")), record.n_samples
+    if n < 3 * lag + _FEWEST:
         return nothing
-    together = _unbroken(grid, record.mask)
-    if int(np.sum(together)) < 10 * _DIFFERENCES:
+    first = np.arange(n - 3 * lag)
+    invalid = np.concatenate([[0], np.cumsum(~record.mask)])
+    whole = (grid.number[first + 3 * lag] - grid.number[first] == 3 * lag) & (invalid[first + 3 * lag + 1] == invalid[first])
+    a, b, c, d = (first[whole] + k * lag for k in range(4))
+    if a.shape[0] < _FEWEST:
         return nothing
-    smooth = _smoothed(record.position)
-    velocity = np.gradient(smooth, grid.period)
-    moved = np.diff(velocity * grid.off, _DIFFERENCES)[together]
-    rest = np.diff(record.position, _DIFFERENCES)[together]
+    q = record.position
+    way = q[d] - q[a]
+    by_stamp, by_grid = ((time[c] - time[b]) / (time[d] - time[a]) for time in (record.time, grid.time))
+    moved = way * (by_stamp - by_grid)
+    rest = q[c] - q[b] - way * by_grid
     power = float(moved @ moved)
     if power == 0.0:
         return nothing
     share = float(moved @ rest) / power
-    left = rest - share * moved
-    score = moved * left
-    # Neighbours share samples: their products are added up over blocks.
-    blocks = np.add.reduceat(score, np.arange(0, score.shape[0], 8 * _DIFFERENCES))
-    error = float(np.sqrt(np.sum(blocks**2))) / power
+    # Neighbours share samples: what is left out in turn are blocks, so that a few that decide alone decide little.
+    blocks = np.arange(0, moved.shape[0], 8 * 3 * lag)
+    products, powers = (np.add.reduceat(each, blocks) for each in (moved * rest, moved**2))
+    without = (np.sum(products) - products) / np.maximum(power - powers, 1e-300)
+    n = blocks.shape[0]
+    error = float(np.sqrt(max(n - 1, 0) / n * np.sum((without - np.mean(without)) ** 2))) if n > 1 else float("inf")
     return Jitter(share, error)
 
 
-def _unbroken(grid: Grid, valid: Mask) -> Mask:
-    """True for each difference that no gap and no invalid sample reaches into."""
-    whole = np.diff(grid.number) == 1.0
-    width = _DIFFERENCES
-    good = np.lib.stride_tricks.sliding_window_view(whole, width).all(axis=1)
-    marks = np.lib.stride_tricks.sliding_window_view(valid, width + 1).all(axis=1)
-    return np.asarray(good & marks, dtype=np.bool_)
-
-
-def _smoothed(position: Array) -> Array:
-    """Position without its quickest part, over five samples by a parabola (Savitzky and Golay 1964)."""
-    padded = np.concatenate([np.repeat(position[:1], 2), position, np.repeat(position[-1:], 2)])
-    return np.convolve(padded, np.array([-3.0, 12.0, 17.0, 12.0, -3.0]) / 35.0, mode="valid")
+def is_jitter(grid: Grid) -> bool:
+    """True where steps make up for each other, as those of an even clock do that is read late."""
+    step = np.diff(grid.off)
+    step = step - np.mean(step)
+    return float(step[1:] @ step[:-1]) < -_HALF * _HALF * float(step @ step)
 
 
 def evened(record: Record) -> Record:
@@ -224,9 +237,9 @@ def evened(record: Record) -> Record:
     if grid.period <= 0.0 or float(np.max(np.abs(grid.off))) < _EVEN * grid.period or not np.all(np.diff(grid.time) > 0.0):
         return record
     found = jitter_of(record, grid)
-    if found.follows:
+    if found.follows or not (found.is_even or is_jitter(grid)):
         return record
     about = f"stamps jitter by {1e3 * grid.spread:.3g} ms ({100.0 * grid.spread / grid.period:.2g} % of a sample)"
-    why = "the motion doesn't" if np.isfinite(found.error) and found.error < _HALF else "the motion doesn't decide it"
+    why = "the motion doesn't" if found.is_even else "the motion doesn't decide it"
     note = f"{about}, {why}: taken as even at {1.0 / grid.period:.5g} Hz; stamp where the sensor is read"
     return replace(record, time=grid.time - grid.time[0], notes=(*record.notes, note))

@@ -29,12 +29,14 @@ def turned(view: View) -> tuple[bool | None, str, float]:
     """Whether the position has the wrong sign (None: can't be told), by what, and the correlation."""
     if not view.moves:
         return None, "it does not move", math.nan
+    said = "neither a reference nor a velocity was recorded"
     if view.even.reference is not None:
         alike = agreement(view, np.gradient(view.low_pass(view.even.reference), view.h))
         if alike < -_SURE:
             return True, "the reference", alike
         if alike > _SURE:
             return False, "the reference", alike
+        said = f"the reference hardly moves with it (correlation {alike:+.2f})"
     if view.even.velocity is not None:
         alike = agreement(view, view.low_pass(view.even.velocity))
         friction, error, _ = friction_along(view)
@@ -43,7 +45,8 @@ def turned(view: View) -> tuple[bool | None, str, float]:
             return True, "velocity and force", alike
         if alike > _SURE:
             return False, "the velocity", alike
-    return None, "neither a reference nor a velocity was recorded", math.nan
+        said = f"the recorded velocity hardly moves with it (correlation {alike:+.2f})"
+    return None, said, math.nan
 
 
 def _judge(view: View, evidence: Evidence) -> Finding:

@@ -1,14 +1,15 @@
 """Stamps: gaps, samples that are missing, samples that were repeated, jitter.
 
-A step of n median steps is n - 1 missing samples. A sample with the same position and the same effort as the one before,
-while both usually change, is the one before again. The value is the share of samples that are missing or repeated.
+A step of n median steps is n - 1 missing samples, unless the samples were read unevenly. A sample with the same position and
+the same effort as the one before, while both usually change, is the one before again. The value is the share of samples that
+are missing or repeated.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...signals.stamps import grid_of
+from ...signals.stamps import grid_of, is_jitter
 from ..check import Check, Evidence, Finding, Verdict, each
 from ..view import View, runs
 
@@ -51,24 +52,30 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     jitter = 1.4826 * float(np.median(np.abs(step - usual))) / usual
     spread = float(np.std(step[missing == 0.0] - usual)) / usual
     gaps = tuple((float(time[a]), float(time[b])) for a, b in runs(missing > 0.0))[:20]
-    share = lost + again
+    uneven = max(jitter, spread)
     parts = []
+    # No even clock stands behind stamps that differ so much and don't make up for each other: nothing is missing between them.
+    unevenly = uneven > _JITTER_FAULT and not is_jitter(grid)
+    if unevenly:
+        lost, gaps = 0.0, ()
+        low, high = 1e3 * np.quantile(step, (0.05, 0.95))
+        parts.append(f"read unevenly: {low:.3g} to {high:.3g} ms apart, {1e3 * float(np.max(step)):.3g} ms at most")
+    share = lost + again
     if lost > 0.0:
         parts.append(f"{100 * lost:.2g} % of the samples are missing, the longest gap {1e3 * float(np.max(step)):.3g} ms")
     if again > 0.002:
         parts.append(f"{100 * again:.2g} % of the samples repeat the one before")
-    uneven = max(jitter, spread)
-    if uneven > _JITTER:
+    if uneven > _JITTER and not unevenly:
         parts.append(f"stamps jitter by {100 * uneven:.0f} % of a step")
     # What was made of them when the recording was made ready for use.
     parts += [note for note in view.record.notes if note.startswith(("stamps jitter", "the stamps"))]
-    bad = share > _FAULT or uneven > _JITTER_FAULT
+    bad = share > _FAULT or (uneven > _JITTER_FAULT and not unevenly)
     verdict: Verdict = "fault" if bad else "warning" if parts else "ok"
-    remedy = (
-        ""
-        if verdict == "ok"
-        else "record on the machine that reads the sensor, stamp at the source; --time log may be more even"
-    )
+    remedy = "record on the machine that reads the sensor, stamp at the source; --time log may be more even"
+    if verdict == "ok":
+        remedy = ""
+    elif unevenly and verdict == "warning":
+        remedy = "read the sensor in a loop of an even period; until then fits interpolate between the samples"
     detail = "; ".join(parts) or f"even to {100 * uneven:.1g} % of a step, nothing missing"
     return Finding("stamps", verdict, detail, share, "1", remedy=remedy, time=gaps)
 

@@ -110,6 +110,11 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     at = best if late else zero
     alike = math.copysign(math.sqrt(max(1.0 - found.misfit[at], 0.0)), found.factor[at])
     if abs(alike) < _ALIKE:
+        below = _alike_below(view, recorded, steady)
+        if below is not None:
+            detail = f"the velocity is that of the position only below {below:.2g} Hz (correlation {alike:.2f} further up)"
+            remedy = "one of them is repeated, coarse or filtered; read both at once, at an even rate"
+            return Finding("velocity_signal", "warning", detail, float(found.factor[at]), "1", remedy=remedy)
         detail = f"the velocity is not that of the position (correlation {alike:.2f})"
         remedy = "check which joint or which side of the gear it belongs to; fits use the position's derivative"
         return Finding("velocity_signal", "warning", detail, float(found.factor[at]), "1", remedy=remedy)
@@ -125,6 +130,17 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     if interval[0] < 0.5 or interval[1] > 1.5:
         return Finding("velocity_signal", "unknown", "the position is too coarse to compare it with", scale, "1", interval)
     return Finding("velocity_signal", "ok", f"the position's derivative, times {scale:.4g}", scale, "1", interval)
+
+
+def _alike_below(view: View, recorded: Array, steady: bool) -> float | None:
+    """The highest frequency [Hz], by halves, below which the velocity is the derivative of the position; None where none is."""
+    cutoff = 0.5 * min(view.cutoff, _BAND / view.h)
+    while (found := _shifted(view, recorded, cutoff, steady)) is not None:
+        alike = 1.0 - float(found.misfit[found.best])
+        if alike > _ALIKE**2 and found.factor[found.best] > 0.0:
+            return cutoff
+        cutoff *= 0.5
+    return None
 
 
 def _effect(found: _Shifted, zero: int) -> float:
