@@ -39,6 +39,7 @@ _FEWEST = 40  # comparisons that tell anything
 _EVEN = 1e-3  # of a period: stamps that are evener are left as they are
 _SURE = 1.645  # standard errors: 90 % two-sided
 _HALF = 0.5
+_NOTE = "stamps jitter"  # how the note begins that says what was made of them
 _WANDER = 4.0  # times: by how much a grid that wanders has to follow the stamps better than a straight one does
 _SLOW = 501  # samples over which a clock may wander
 _ROUNDED = 1.5  # steps of the rounding that stamps may lie apart about a line: one, and what the line itself is off
@@ -232,14 +233,16 @@ def is_jitter(grid: Grid) -> bool:
 
 
 def evened(record: Record) -> Record:
-    """``record`` with even stamps and a note of it, unless its motion follows the recorded ones."""
+    """``record`` with even stamps and a note of it, unless its motion follows the recorded ones, or that was done before."""
+    if any(note.startswith(_NOTE) for note in record.notes):
+        return record
     grid = grid_of(record.time)
     if grid.period <= 0.0 or float(np.max(np.abs(grid.off))) < _EVEN * grid.period or not np.all(np.diff(grid.time) > 0.0):
         return record
     found = jitter_of(record, grid)
     if found.follows or not (found.is_even or is_jitter(grid)):
         return record
-    about = f"stamps jitter by {1e3 * grid.spread:.3g} ms ({100.0 * grid.spread / grid.period:.2g} % of a sample)"
+    about = f"{_NOTE} by {1e3 * grid.spread:.3g} ms ({100.0 * grid.spread / grid.period:.2g} % of a sample)"
     why = "the motion doesn't" if found.is_even else "the motion doesn't decide it"
     note = f"{about}, {why}: taken as even at {1.0 / grid.period:.5g} Hz; stamp where the sensor is read"
     return replace(record, time=grid.time - grid.time[0], notes=(*record.notes, note))
