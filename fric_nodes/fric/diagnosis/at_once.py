@@ -13,6 +13,7 @@ from dataclasses import replace
 from ..model import Model
 from .adding import settled_again
 from .additive.together import grown_together, middle_of
+from .confidence import MANY
 from .deadline import is_over
 from .fitting import State, added, refit, without_place
 from .grow import grown_faster
@@ -22,8 +23,6 @@ from .settle import CLEARLY, Step, audit
 from .track import Track
 
 __all__ = ["by_parts", "helped", "surpassing", "together"]
-
-_TOGETHER = 3  # effects: of fewer the best is found one after the other
 
 
 def together(tracks: Sequence[Track], nominal: Model, tell: Callable[[str], None]) -> Growth:
@@ -72,7 +71,7 @@ def by_parts(
     if not proposed.steps:
         return growth
     if growth is None and (
-        len(proposed.steps) < _TOGETHER or left > max(LITTLE * proposed.begin.excess, CLEARLY * proposed.end.floor)
+        len(proposed.steps) < MANY or left > max(LITTLE * proposed.begin.excess, CLEARLY * proposed.end.floor)
     ):
         return None
     # Of many laws that leave much, none is exchanged for its rivals: they were weighed beside each other when they came.
@@ -81,7 +80,7 @@ def by_parts(
     other = settled_again(proposed) if settles else replace(proposed, rest=rest)
     if growth is None:
         other = grown_faster(tracks, other, tell)
-        complete = len(other.steps) >= _TOGETHER and other.rest < AGAIN and implausible(other.track, other.end.fit.model) == 0.0
+        complete = len(other.steps) >= MANY and other.rest < AGAIN and implausible(other.track, other.end.fit.model) == 0.0
         return replace(other, last=screened(other.track, other.end)) if complete else None
     left, least = (left_to_a_fast_observer(tracks, each) + each.dear for each in (other, growth))
     better = bool(other.steps) and left < least
@@ -99,7 +98,7 @@ def surpassing(tracks: Sequence[Track], proposed: Growth, growth: Growth) -> Gro
         proposed: grown by several terms at once (:func:`together`), not settled.
         growth: grown by one term after the other.
     """
-    if len(proposed.steps) < _TOGETHER:
+    if len(proposed.steps) < MANY:
         return None
     rest = audit(proposed.track, proposed.begin.fit.model, proposed.end.fit.model)
     unlikely = max(rest, left_to_a_fast_observer(tracks, proposed)) + implausible(proposed.track, proposed.end.fit.model)

@@ -21,6 +21,7 @@ import numpy as np
 
 from ..model import Model
 from ..record import Array
+from .along import REST
 from .candidates import FRICTION, place_of
 from .least_squares import Fit
 from .motion import Motion
@@ -33,7 +34,6 @@ __all__ = ["Signature", "agreed", "signatures"]
 _LEVEL, _GAIN = "friction whose level changes with time", "an actuator whose gain changes with time"
 _FORCE = "a force that changes with time"
 _SPAN = 0.25  # [s], of the steps in which something changes with time, at least
-_REST = 0.01  # of the speed, below which a body rests
 _ROWS = 6000  # that a fit uses at most
 _MOST_WAVES = 25.0  # cycles over the travel, from _FEWEST_WAVES on,
 _FEWEST_WAVES = 0.7
@@ -149,7 +149,7 @@ def _rubbing(model: Model, held: _Motions) -> list[Array]:
 def _directions(held: _Motions, model: Model) -> tuple[list[Array], list[Array]]:
     """Direction of the velocity, zero at rest; and where the axis is free to move: a contact that sticks takes up what acts."""
     fast = max(float(np.quantile(np.abs(np.concatenate([each.velocity for each in held.motion])), 0.9)), 1e-12)
-    way = [np.tanh(each.velocity / (_REST * fast)) for each in held.motion]
+    way = [np.tanh(each.velocity / (REST * fast)) for each in held.motion]
     sticks = any(each.effect.level is not None for each in model.terms)
     return way, [np.abs(each) if sticks else np.ones_like(each) for each in way]
 

@@ -23,6 +23,7 @@ from .findings import (
     unlearnt_finding,
     with_presences,
 )
+from .fitting import NOTHING
 from .going_with_motion import only_noise
 from .growth import Growth, without_nothings
 from .held_back import OnlyThere, only_there
@@ -65,9 +66,7 @@ from .track import Track
 
 __all__ = ["concluded"]
 
-_MISMATCH = 0.35  # of the floor: with less than this left above it, nothing stays unexplained
 _CONFIRMED = 0.15  # of the floor: less than this above it on recordings held back doesn't confirm one
-_LEFT_UNSEEN = 0.05  # of what is missing in the recordings held back: what has the right structure leaves less there
 _NEGLIGIBLE = 1e-4  # NOE [%]: a force within a thousandth is what steps of any simulation and sampling differ by
 
 _TOO_LITTLE = (
@@ -233,7 +232,7 @@ def _rest(
         remains = energy_left(seen.held, seen.left["refit"], seen.floor)
         where = locate(seen.held, remains, scales, seen.begin.model)
         return unlearnt_finding(where, alone, seen.scored), Unexplained(1.0, where), remains
-    if not seen.missing or not (doubts.unknown or seen.growth.end.excess > _MISMATCH * seen.growth.end.floor):
+    if not seen.missing or not (doubts.unknown or seen.growth.end.excess > NOTHING * seen.growth.end.floor):
         return None, unexplained, None
     remains = energy_left(seen.held, seen.left["augmented"], seen.floor)
     where = locate(seen.held, remains, scales, seen.end)
@@ -325,7 +324,7 @@ def _doubts(seen: _Judged, searched: Sequence[Track], findings: Sequence[Finding
     bent = [term for term in (end.terms[list(end.prefixes).index(step.term)] for step in growth.steps) if strained(term)]
     # How well both shares are known depends on how far what is missing stands out, there and here.
     floor = seen.scored.noise_floor
-    there = min(_LEFT_UNSEEN + FLOOR_UNSURE * floor / max(seen.scored.noe_refit - floor, 1e-300), HARDLY)
+    there = min(LITTLE_LEFT + FLOOR_UNSURE * floor / max(seen.scored.noe_refit - floor, 1e-300), HARDLY)
     much = rest > most_left(growth) or seen.seen_rest > there
     reserved = much or doubtful or far_off or beside or bool(bent)
     if seen.missing and (reserved or rest > LITTLE_LEFT or len(growth.steps) >= MANY):

@@ -22,6 +22,7 @@ __all__ = [
     "FAINT",
     "LITTLE_LEFT",
     "MANY",
+    "MOST_SURE",
     "UNEXPLAINED",
     "confidence_of",
     "is_doubtful",
@@ -39,13 +40,15 @@ UNEXPLAINED = 0.15
 MANY = 3
 """Effects at once that still leave something are more likely to have stood in for one."""
 
+MOST_SURE = 0.995
+"""Confidence at most."""
+
 LITTLE_LEFT = 0.05
 """Share of what was missing: with more left by so many, it is looked at what else it could be."""
 
 _OFFSET, _BY_RIVAL, _BY_REST = 1.2, 1.58, -14.1
 _BY_SHARE, _WHOLE = 0.7, 0.2  # of what is missing: what takes more of it doesn't mend another's law
 _LEAST = 0.01  # of what is missing: what takes less has come since it takes nearly all that the others leave
-_MOST = 0.995
 _FAINTLY_UNKNOWN = 0.35  # statistical: where hardly more than noise is missing, as unknown_confidence says
 
 FAINT = 1.0
@@ -84,7 +87,7 @@ def confidence_of(rest: float, step: Step, share: float) -> float:
     """
     small = min(math.log(max(share, _LEAST) / _WHOLE), 0.0)
     logit = _OFFSET + _BY_RIVAL * margin_of(step) + _BY_REST * rest + _BY_SHARE * small
-    return round(min(1.0 / (1.0 + math.exp(-logit)), _MOST), 4)
+    return round(min(1.0 / (1.0 + math.exp(-logit)), MOST_SURE), 4)
 
 
 def is_doubtful(confidences: Sequence[float], rest: float) -> bool:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from ..effect import Effect
 from ..effects import by_name
 
-__all__ = ["NATS_PER_PARAMETER", "PER_PARAMETER", "further_parameters", "law_of_form", "n_free"]
+__all__ = ["EVIDENCE", "NATS_PER_PARAMETER", "PER_PARAMETER", "further_parameters", "law_of_form", "n_free"]
 
+EVIDENCE = 10.0
+"""Statistical [nats]: what a term must gain on unseen blocks to be more than chance among some hundred trials."""
 PER_PARAMETER = 0.012
 """Statistical, of what is missing above the floor: the price of a parameter."""
 NATS_PER_PARAMETER = 4.0

@@ -31,7 +31,7 @@ from .result import (
 )
 from .rival import Rival
 from .screen import Tried
-from .settle import Step
+from .settle import CLEARLY, Step
 from .start import FIRST_FIT
 from .track import Track
 
@@ -52,7 +52,6 @@ _IN_PART = 0.6  # of what several explain: where they are missed by less, they s
 _AS_MUCH = 0.9  # of what they explain is as much
 _FEW = 16  # coefficients, by which a signature is simpler than so many effects
 _MOSTLY = 0.5  # of what a grown model leaves, for a signature to say what that is
-_STANDS_OUT = 3.0  # times the floor: with less, noise is more than a quarter of what there is to explain
 _UNDECIDED = 0.45  # confidence at most, where no parameter of an effect is as large as its own standard error
 
 
@@ -293,7 +292,7 @@ def signature_of(tracks: Sequence[Track], growth: Growth, rest: float, shares: S
     # Shares are held against those of the grown model, which are as its own observer sees them: that one is asked first.
     ordered = sorted(tracks, key=lambda each: (each.bandwidth != growth.track.bandwidth, each.bandwidth))
     looks = [(track, refit(track, growth.begin.fit.model, max_iterations=FIRST_FIT)) for track in ordered]
-    clear = [(track, state) for track, state in looks if state.excess > _STANDS_OUT * state.floor]
+    clear = [(track, state) for track, state in looks if state.excess > CLEARLY * state.floor]
     clear = clear or looks[:1]
     whole = agreed([signatures(track, state.fit, () if growth.steps else growth.last) for track, state in clear])
     # What hardly explains anything has no say in what is left either.

@@ -15,7 +15,7 @@ from ..threads import mapped
 from .along import Along
 from .candidates import Scales, closer, fewest_cycles, scales_of, trials_of
 from .indifference import dearer
-from .least_squares import Bounds, Fit
+from .least_squares import INFLATION, Bounds, Fit
 from .motor_side import MOTOR_FRICTION, half_on_motor
 from .screen import Gram, Tried, blocks_of, restraint
 from .track import Track
@@ -49,7 +49,6 @@ N_TWINS = 3
 """Statistical: twins that a floor is reckoned from."""
 _CLEAR = 25.0  # times the floor
 _ASTRAY = 4.0  # times the floor of a simpler model
-_INFLATION = 2.0
 _LIGHTEST = 0.3  # of the mass that a fit began with
 _SHAKES = (0.3, 0.1, 0.03)  # by which values are moved, as shares of themselves
 _ROUNDS = 2
@@ -149,7 +148,7 @@ def unseen(track: Track, fit: Fit, residual: Array, apart: str = "") -> float:
     columns = np.concatenate([residual[:, None], fit.jacobian[:, used]], axis=1)
     held = np.full(columns.shape[1], restraint(track, fit))
     gram = Gram(columns, blocks_of(track, columns.shape[0]), held)
-    return min(gram.left(0, range(1, columns.shape[1])), _INFLATION * float(residual @ residual))
+    return min(gram.left(0, range(1, columns.shape[1])), INFLATION * float(residual @ residual))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,12 @@ from dataclasses import dataclass, field, replace
 
 from ..model import Model
 from .candidates import candidates, scales_of
+from .confidence import FAINT, LITTLE_LEFT
 from .fitting import State, refit
 from .price import PER_PARAMETER, implausible
 from .rival import Rival
 from .screen import Tried, screen
-from .settle import Step, is_nothing
+from .settle import CLEARLY, TO_STAY, Step, is_nothing
 from .track import Track
 
 __all__ = [
@@ -30,13 +31,13 @@ __all__ = [
     "without_nothings",
 ]
 
-AGAIN = 0.05
+AGAIN = LITTLE_LEFT
 """Statistical, of what is missing: where nothing more helps and more is left, another beginning is tried."""
-LITTLE = 0.004
+LITTLE = TO_STAY
 """Statistical, of what is missing at the start: laws that differ in form only leave as much."""
-FAINTLY = 3.0
+FAINTLY = CLEARLY
 """Statistical, times the floor: with less missing, the share that is left says nothing, and a faint term is looked for."""
-NAMELESS = 1.0
+NAMELESS = FAINT
 """Statistical, times the floor: less than that above it, what no effect explains could be the measuring chain's."""
 
 

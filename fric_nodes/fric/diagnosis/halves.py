@@ -20,7 +20,7 @@ from scipy.signal import lfilter
 from ..record import Array
 from .additive.asked import Asked
 from .fitting import State
-from .least_squares import Fit
+from .least_squares import INFLATION, Fit
 from .screen import restraint
 from .track import Track
 
@@ -29,7 +29,6 @@ __all__ = ["Half", "Halves"]
 _A_LITTLE = 0.1  # of a residual of the half that is judged on: it says what the other one tells hardly at all
 _ORDER = 12  # numerical: values before, a dozen time constants of the observer
 _UNSURE = 1e-4  # numerical, of a residual's energy: keeps the equations of the filter regular
-_INFLATION = 2.0  # numerical: of what both halves leave, the most that one leaves in the other
 
 
 @dataclass(frozen=True)
@@ -129,4 +128,4 @@ def _on_other(track: Track, fit: Fit, rows: NDArray[np.bool_], white: _Whitening
         values[name] += moved
     left = white.energy(fit.residual + jacobian @ change, ~rows)
     # Where first order leads far away, fits to both halves are the better guess.
-    return values, min(left, _INFLATION * white.energy(fit.residual, ~rows))
+    return values, min(left, INFLATION * white.energy(fit.residual, ~rows))

@@ -15,7 +15,7 @@ from .candidates import scales_of
 from .confidence import LITTLE_LEFT, MANY, UNEXPLAINED
 from .fitting import bounds_of
 from .growth import Growth
-from .least_squares import Fit
+from .least_squares import FROM_NEAR, Fit
 from .locate import moved_back, steady
 from .result import (
     Grown,
@@ -55,7 +55,6 @@ _KEPT = 0.4  # of what a grown model took off where it was fitted, to be found o
 FLOOR_UNSURE = 0.6  # of a floor, by which that may be more: what little is missing is known the worse
 HARDLY = 0.6  # with more than this left, something unknown remains however little is known of the floor
 _TWINS = 5
-_AS_FAST = 8  # iterations of a fit by a faster observer
 _DECIDED = 0.5  # of what the refitted nominal model lacks: with more, twins of the grown one say nothing
 _LOCATING = 600.0  # [rad/s], for spans of time
 _RESAMPLED = 20  # blocks, each longer than what is left hangs together
@@ -130,7 +129,7 @@ def as_fast(whole: Sequence[Track], held: Track, growth: Growth) -> tuple[Track,
     if track is None or held.bandwidth <= growth.track.bandwidth:
         return growth.track, *fits
     bounds = [bounds_of(fit.model, scales_of(track)) for fit in fits]
-    begin, end = (track.fit(fit.model, fit.names, _AS_FAST, among) for fit, among in zip(fits, bounds, strict=True))
+    begin, end = (track.fit(fit.model, fit.names, FROM_NEAR, among) for fit, among in zip(fits, bounds, strict=True))
     return track, begin, end if growth.steps else begin
 
 

@@ -17,11 +17,15 @@ from ..identification.gauss_newton import Solution, minimise
 from ..model import Model
 from ..record import Array
 
-__all__ = ["Bounds", "Fit", "fitted_values", "limits_of"]
+__all__ = ["FROM_NEAR", "INFLATION", "Bounds", "Fit", "fitted_values", "limits_of"]
 
 Bounds = dict[str, tuple[float, float]]
 """Least and largest value of parameters by their names, in their units."""
 
+INFLATION = 2.0
+"""Numerical: of what all blocks leave together, the most that is left where a block or a half is left out."""
+FROM_NEAR = 8
+"""Numerical: iterations of a fit from where nearly everything fits."""
 _TINY = 1e-9  # numerical: of its scale, the least that a positive parameter may be
 
 

@@ -28,6 +28,7 @@ from ..effects import EFFECTS, by_name
 from ..model import ModelError, Term
 from ..record import Array, Units
 from .additive.residual import independent_values
+from .costs import EVIDENCE
 from .expected import Expected
 from .faint import beyond_chance
 from .fitting import State
@@ -38,8 +39,6 @@ from .track import Track
 
 __all__ = ["EVIDENCE", "Limit", "limits_of"]
 
-EVIDENCE = 10.0
-"""Statistical [nats]: what a term must gain on unseen blocks to be more than chance among some hundred trials."""
 
 _NEAR = 1.3  # numerical: so near to the limit the change is about proportional to the size
 _STEP = 30.0  # numerical: of one step towards the limit

@@ -14,6 +14,7 @@ from ..model import Term
 from .candidates import Scales
 from .exchange import exchanged_at
 from .fitting import State, bounds_of, free_names
+from .least_squares import FROM_NEAR
 from .other_laws import laws_beside, laws_further, told
 from .price import OF_FLOOR, price_of
 from .rival import Rival, rival_of
@@ -22,7 +23,6 @@ from .track import Track
 
 __all__ = ["extended", "is_stop", "shaped", "that_give", "with_play"]
 
-_AS_A_SPRING = 8  # iterations
 _GIVES = (0.03, 0.3, 3.0)  # of the gap, that stops give under the typical force
 _FURTHER = 12  # iterations of a fit by a law that goes further
 
@@ -101,7 +101,7 @@ def _as_springs(track: Track, state: State, rival: Rival, found: Screening, scal
         return []
     spring = Term(effect, tuple(given[p.name] for p in effect.parameters))
     model = rival.fit.model.with_terms(spring if each is stops[0] else each for each in rival.fit.model.terms)
-    fit = track.fit(model, free_names(model), _AS_A_SPRING, bounds_of(model, scales))
+    fit = track.fit(model, free_names(model), FROM_NEAR, bounds_of(model, scales))
     return [rival_of(track, state, offer, fit, found)]
 
 

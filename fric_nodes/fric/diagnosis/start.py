@@ -18,6 +18,7 @@ from ..identification.result import IdentificationError, Options
 from ..model import Model, build_model
 from ..plants import PLANTS
 from ..record import Record
+from .align import Z
 from .candidates import scales_of
 from .fitting import bounds_of, free_names
 from .price import FAR_OFF, mass_off
@@ -43,7 +44,6 @@ FAST = 1.0
 """Largest product of bandwidth and sample time."""
 FIRST_FIT = 6
 """Iterations, by which starts are compared."""
-_SURE = 1.96  # standard errors, 95 %
 _NEXT_TO_NOTHING = 1e-3  # of an inertia, where all of it may be chance
 _LACKS_MUCH = 0.3  # of the force's variance: more than a model that has most of the physics
 _EXPLAINED = 0.02  # of the force: a plant that leaves less of it may be the one recorded
@@ -97,7 +97,7 @@ def _by_inverse_dynamics(model: Model, train: Sequence[Record]) -> Model | None:
     found = fitted.model
     # Of an inertia that hardly shows no more is taken than is sure.
     for name, variance in zip(fitted.free.names, np.diag(fitted.covariance), strict=True):
-        value, reach = found.value(name), _SURE * float(np.sqrt(max(variance, 0.0)))
+        value, reach = found.value(name), Z * float(np.sqrt(max(variance, 0.0)))
         if name in model.plant.inertia_names and reach >= value:
             found = found.with_value(name, max(_NEXT_TO_NOTHING * value, value - reach))
     return found if np.all(np.isfinite(found.values)) else None

@@ -18,6 +18,7 @@ from ..record import Array, Record
 from ..threads import mapped
 from .along import Along
 from .candidates import candidates, place_of, scales_of
+from .confidence import MOST_SURE
 from .fitting import bounds_of, free_names, with_amplitudes
 from .least_squares import Fit
 from .locate import locate, moved_back, steady
@@ -28,7 +29,6 @@ __all__ = ["Suspects", "prepare_suspects", "suspects"]
 
 _STEP = 0.02  # of a parameter's value, or of what would matter, for its column
 _OFFSET, _BY_RIVAL, _BY_REST = 0.5, 2.2, -3.0  # as for findings of a diagnosis
-_MOST = 0.995
 _REFINED, _REFINING, _NEAR = 5, 10, 4.0  # suspects, iterations, and times what the best leaves
 _HARDLY = 0.6  # of the missing energy: when the best suspect leaves more, it is no explanation
 _PER_COLUMN = 0.01  # of the missing energy, the price of a suspect's column
@@ -218,7 +218,7 @@ def _verdict(ranked: list[_Suspect], energy: float, base: float, regime: str, st
         slack = 0.15 * base + _PER_COLUMN * energy
         left = energy if of is None else of.left
         margin = math.log((max(left - base, 0.0) + slack) / (max(best.left - base, 0.0) + slack))
-        return round(min(1.0 / (1.0 + math.exp(-(_OFFSET + _BY_RIVAL * margin + _BY_REST * rest))), _MOST), 3)
+        return round(min(1.0 / (1.0 + math.exp(-(_OFFSET + _BY_RIVAL * margin + _BY_REST * rest))), MOST_SURE), 3)
 
     return Suspects(
         best.effect, best.known, best.component, "" if rival is None else rival.effect,

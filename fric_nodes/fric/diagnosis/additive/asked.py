@@ -16,7 +16,7 @@ from ...record import Array
 from ..candidates import scales_of
 from ..fitting import State, bounds_of, free_names, without_place
 from ..indifference import indifference
-from ..least_squares import Fit
+from ..least_squares import FROM_NEAR, Fit
 from ..track import Track
 from .components import COMPONENTS
 from .evidence import Grouped
@@ -25,7 +25,6 @@ from .residual import ALIKE, functions_of, independent_share
 __all__ = ["Asked"]
 
 _TERM = "term"  # name of a group
-_ITERATIONS = 8  # numerical: from where everything fits
 
 
 class Asked:
@@ -57,7 +56,7 @@ class Asked:
         if place not in self._withouts:
             model = without_place(self._state.fit.model, place)
             bounds = bounds_of(model, scales_of(self._track))
-            self._withouts[place] = self._track.fit(model, free_names(model), _ITERATIONS, bounds)
+            self._withouts[place] = self._track.fit(model, free_names(model), FROM_NEAR, bounds)
         return self._withouts[place]
 
     def nats(self, place: int) -> float:

@@ -17,9 +17,11 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ...model import Model
+from ..costs import EVIDENCE
 from ..deadline import is_over
 from ..fitting import NOTHING, State, added, left_beside, refit, unseen, without_place
 from ..growth import LITTLE
+from ..least_squares import FROM_NEAR
 from ..settle import CLEARLY
 from ..track import Track
 from .asked import Asked
@@ -33,12 +35,10 @@ Weighed = Callable[[State], Callable[[int], tuple[float, Model]]]
 
 _BANDWIDTH = 140.0  # physical [rad/s]: about 22 Hz, where most axes' friction shows and their structures don't yet ring
 _WORTH = 5.0  # statistical, nats: odds of about 150 to one, for a law to be fitted in full
-_GAIN = 10.0  # statistical, nats, for a law to stay: beyond what four parameters take off by chance
 _LESSER = 0.05  # statistical, of the evidence for the strongest law: how well first order tells what others there are
 _PLAUSIBLE = 0.3  # probability among the laws of its component
 _ROUNDS = 6  # numerical: in each at least one term comes
 _ROUNDS_BESIDE = 3  # numerical: what comes later mends what the first has taken for something else
-_TO_WEIGH = 8  # numerical, iterations from where everything fits
 
 
 def middle_of(tracks: Sequence[Track]) -> Track:
@@ -70,7 +70,7 @@ def grown_together(
         whole = _fitted(track, state, offered, tell)
         partial = beside_unknown or whole.excess > max(LITTLE * begin.excess, CLEARLY * whole.floor)
         weighed = _beside_functions(track) if partial else _by_unseen_blocks(track, independent)
-        worth = 0.0 if partial else _GAIN
+        worth = 0.0 if partial else EVIDENCE
         grown = _pruned(track, whole, begin, weighed, tell)
         if _nats(state.left, grown.left, independent) < worth and added(grown.fit.model, state.fit.model):
             # A term that came before has gone for others that don't make up for it: it stays, and they have to help beside it.
@@ -95,7 +95,7 @@ def _fitted(track: Track, state: State, offered: Sequence[Form], tell: Callable[
     model, there = state.fit.model, 0
     while len(offered) > 1 and there < len(offered):
         coming = offered[there : max(2 * there, 1)]
-        fitted.append(refit(track, model.with_terms((*model.terms, *(each.term for each in coming))), _TO_WEIGH))
+        fitted.append(refit(track, model.with_terms((*model.terms, *(each.term for each in coming))), FROM_NEAR))
         model, there = fitted[-1].fit.model, there + len(coming)
     return min(fitted, key=lambda each: each.left)
 
@@ -139,9 +139,9 @@ def _pruned(track: Track, state: State, begin: State, weighed: Weighed, tell: Ca
         left = {k: _left_without(track, state, k) for k in added(begin.fit.model, state.fit.model)}
         for place in sorted(left, key=lambda k: left[k]):
             nats, without = weigh(place)
-            if nats < _GAIN:
+            if nats < EVIDENCE:
                 tell(f"not needed: {state.fit.model.terms[place].effect.title} ({nats:.1f} nats)")
-                state, going = refit(track, without, _TO_WEIGH), True
+                state, going = refit(track, without, FROM_NEAR), True
                 break
     return state
 
@@ -151,7 +151,7 @@ def _by_unseen_blocks(track: Track, independent: float) -> Weighed:
 
     def of(state: State) -> Callable[[int], tuple[float, Model]]:
         def weigh(place: int) -> tuple[float, Model]:
-            without = refit(track, without_place(state.fit.model, place), _TO_WEIGH)
+            without = refit(track, without_place(state.fit.model, place), FROM_NEAR)
             left = left_beside(track, without, state.fit.model.has_slip_dynamics)
             return _nats(left, state.left, independent), without.fit.model
 
