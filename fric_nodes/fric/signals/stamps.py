@@ -221,8 +221,9 @@ def _followed(record: Record, grid: Grid, lag: int) -> Jitter:
     products, powers = (np.add.reduceat(each, blocks) for each in (moved * rest, moved**2))
     without = (np.sum(products) - products) / np.maximum(power - powers, 1e-300)
     n = blocks.shape[0]
-    error = float(np.sqrt(max(n - 1, 0) / n * np.sum((without - np.mean(without)) ** 2))) if n > 1 else float("inf")
-    return Jitter(share, error)
+    if n < 2 or float(np.min(power - powers)) <= 0.0:
+        return nothing  # one block has all that there is to see
+    return Jitter(share, float(np.sqrt((n - 1) / n * np.sum((without - np.mean(without)) ** 2))))
 
 
 def is_jitter(grid: Grid) -> bool:
