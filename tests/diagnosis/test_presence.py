@@ -90,8 +90,9 @@ def test_what_stays_unexplained_never_makes_surer(found: dict[str, Presence], fi
     assert sure["ripple"].evidence.rest == 0.4
 
 
-def test_what_only_mends_something_unknown_is_not_sure(found: dict[str, Presence]) -> None:
-    assert found["quadratic_drag"].probability < 0.3 * found["ripple"].probability
+def test_what_only_mends_something_unknown_is_not_sure(fitted: Fitted) -> None:
+    beside = presences(*fitted, SHARES, 0.4)
+    assert beside["quadratic_drag"].probability < 0.3 * beside["ripple"].probability
 
 
 def test_what_halves_contradict_each_other_about_goes(fitted: Fitted) -> None:

@@ -82,6 +82,15 @@ def test_samples_that_were_read_unevenly_are_left_where_they_are() -> None:
     assert evened(given) is given
 
 
+def test_one_stamp_that_is_off_decides_nothing(even: Array) -> None:
+    """As in a block of samples that begins with the first one of a late timer."""
+    stamps = even[:500].copy()
+    stamps[0] += 1.2e-4
+    given = record(stamps, even[:500])
+    assert not np.isfinite(jitter_of(given, grid_of(given.time)).error)
+    assert evened(given).n_samples == 500
+
+
 def test_where_the_motion_says_nothing_steps_that_make_up_for_each_other_are_jitter(even: Array) -> None:
     rng = np.random.default_rng(8)
     late = even + rng.uniform(0.0, 9e-4, N)
