@@ -106,8 +106,8 @@ def linear_algebra_in_one() -> Iterator[None]:
 def keep_linear_algebra_in_one() -> None:
     """Make linear algebra use one thread in this process and in those that it starts, unless the environment says how many.
 
-    The matrices here are small. With other work on the machine, the threads that share one wait for each other, and that may
-    take some hundred times as long as what they compute.
+    The matrices here are small. With other work on the machine, the threads that share one wait for each other far longer than
+    they compute.
     """
     if any(name in os.environ for name in _OF_LIBRARIES):
         return

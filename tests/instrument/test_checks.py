@@ -149,7 +149,9 @@ def test_a_sign_that_a_velocity_does_not_tell(clean: Record) -> None:
     other = np.random.default_rng(4).standard_normal(clean.n_samples)
     finding = found("position_sign", replace(clean, reference=None, velocity=other))
     assert finding.verdict == "unknown"
-    assert "hardly moves with it" in finding.detail
+    assert "doesn't clearly move with it" in finding.detail
+    still = found("position_sign", replace(clean, reference=np.zeros(clean.n_samples), velocity=None))
+    assert still.detail == "the reference stands still"
     finding = found("position_sign", replace(clean, reference=None, velocity=None))
     assert finding.detail == "neither a reference nor a velocity was recorded"
 

@@ -230,6 +230,7 @@ def is_jitter(grid: Grid) -> bool:
     """True where steps make up for each other, as those of an even clock do that is read late."""
     step = np.diff(grid.off)
     step = step - np.mean(step)
+    # Halfway between the correlation of -1/2 and none.
     return float(step[1:] @ step[:-1]) < -_HALF * _HALF * float(step @ step)
 
 

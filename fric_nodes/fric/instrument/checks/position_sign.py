@@ -36,7 +36,7 @@ def turned(view: View) -> tuple[bool | None, str, float]:
             return True, "the reference", alike
         if alike > _SURE:
             return False, "the reference", alike
-        said = f"the reference hardly moves with it (correlation {alike:+.2f})"
+        said = _undecided("the reference", alike)
     if view.even.velocity is not None:
         alike = agreement(view, view.low_pass(view.even.velocity))
         friction, error, _ = friction_along(view)
@@ -45,8 +45,17 @@ def turned(view: View) -> tuple[bool | None, str, float]:
             return True, "velocity and force", alike
         if alike > _SURE:
             return False, "the velocity", alike
-        said = f"the recorded velocity hardly moves with it (correlation {alike:+.2f})"
+        said = _undecided("the recorded velocity", alike)
     return None, said, math.nan
+
+
+def _undecided(by: str, alike: float) -> str:
+    """Why ``by`` doesn't tell the sign, which has the correlation ``alike`` with the motion; NaN where it stands still."""
+    return (
+        f"{by} stands still"
+        if math.isnan(alike)
+        else f"{by} doesn't clearly move with it or against it (correlation {alike:+.2f})"
+    )
 
 
 def _judge(view: View, evidence: Evidence) -> Finding:
