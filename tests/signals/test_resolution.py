@@ -54,3 +54,18 @@ def test_drawn_errors_are_as_large_as_those_of_the_instrument() -> None:
     assert level_of(recorded) == pytest.approx(float(np.std(true)), rel=0.2)
     # Of another origin: correlated errors would cancel in part instead of showing what errors do.
     assert abs(float(np.corrcoef(made, true)[0, 1])) < 0.1
+
+
+def test_samples_taken_unevenly_are_no_noise() -> None:
+    """A controller of 500 Hz logged every 10 or 12 ms; its noise is still told, at its own times, and the smooth motion isn't."""
+    rng = np.random.default_rng(8)
+    time = np.cumsum(rng.choice([0.010, 0.012], size=6000))
+    smooth = 1.5 * np.sin(2.0 * np.pi * 0.3 * time)
+    noisy = smooth + 2e-5 * rng.standard_normal(time.shape)
+    assert noise_of(noisy) > 1e-4
+    assert noise_of(noisy, time=time) == pytest.approx(2e-5, rel=0.1)
+    quick = np.abs(np.cos(2.0 * np.pi * 0.3 * time)) > 0.5
+    assert noise_of(noisy, quick, time) == pytest.approx(2e-5, rel=0.1)
+    # Evenly sampled, both ways are one.
+    even = 0.01 * np.arange(6000)
+    assert noise_of(noisy, time=even) == noise_of(noisy)

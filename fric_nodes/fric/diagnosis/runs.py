@@ -87,7 +87,7 @@ class Runs:
                 runs.append(run)
                 time.append(record.time[first] + np.cumsum(run.step))
                 number.append(k)
-                noise.append(max(noise_of(run.position), _SHAKEN * step_of(run.position)))
+                noise.append(max(noise_of(run.position, time=time[-1]), _SHAKEN * step_of(run.position)))
         mass = model.total_inertia
         return cls(
             tuple(runs),

@@ -73,8 +73,11 @@ def _sensor_noise(run: Run, velocity: Array) -> Array:
     """
     n, step = run.position.shape[0], step_of(run.position)
     speed = np.abs(velocity)
+    time = np.cumsum(run.step)
     edges = np.quantile(speed, np.linspace(0.0, 1.0, 1 + max(min(_SPEEDS, n // _FEWEST), 1)))
-    noise = np.array([noise_of(run.position, (speed >= low) & (speed <= high)) for low, high in itertools.pairwise(edges)])
+    noise = np.array(
+        [noise_of(run.position, (speed >= low) & (speed <= high), time) for low, high in itertools.pairwise(edges)]
+    )
     variance = np.interp(speed, 0.5 * (edges[1:] + edges[:-1]), noise**2)
     return np.asarray(np.sqrt(np.maximum(variance - step**2 / 12.0, 0.0)))
 

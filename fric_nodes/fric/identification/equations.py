@@ -99,7 +99,11 @@ def equations(records: list[Record], options: Options, model: Model | None = Non
     even = [_even(record, notes) for record in records]
     cutoff, decimation = _filter(records[0].source, even, options, rate, model is not None and model.has_slip_dynamics)
     edge = int(np.ceil(_EDGE_PERIODS / cutoff * rate - 1e-6))
-    stretches = [stretch for record in even for stretch in _stretches(record, cutoff, edge, notes)]
+    stretches = [
+        replace(stretch, level=None if on_grid is record else level_of(record.position, record.time))
+        for record, on_grid in zip(records, even, strict=True)
+        for stretch in _stretches(on_grid, cutoff, edge, notes)
+    ]
     if not stretches:
         raise IdentificationError(
             ", ".join(record.source for record in records),

@@ -16,12 +16,11 @@ from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
-from scipy.special import comb
 
 from ..model import Model
 from ..record import Array, Record
 from ..signals.initial_state import initial_state
-from ..signals.resolution import noise_of
+from ..signals.resolution import noise_at_each, noise_of
 from ..simulation import intervals
 from .equations import surroundings
 
@@ -32,7 +31,6 @@ SETTLING = 20
 
 SHORTEST = 10 * SETTLING
 """Numerical: samples of the shortest run, of which a tenth at most is dropped."""
-_DIFFERENCES = 6  # which no smooth force survives
 _AROUND = 9  # of them
 _APART = 0.5  # of the usual step: samples that are no closer
 _CHANCE = 3.0  # times the variance of white noise, that so few of them seldom reach
@@ -119,21 +117,21 @@ def runs_of(record: Record, late: float | None = None) -> list[Run]:
     for first, last in zip(bounds[::2].tolist(), bounds[1::2].tolist(), strict=True):
         if last - first < SHORTEST:
             continue
-        position = record.position[first:last]
-        step = np.diff(record.time[first:last])
+        time, position, effort = (each[first:last] for each in (record.time, record.position, record.effort))
+        step = np.diff(time)
         found.append(
             Run(
                 step=step,
-                effort=np.ascontiguousarray(_over_intervals(record.effort[first:last], step, record.hold, late)),
+                effort=np.ascontiguousarray(_over_intervals(effort, step, record.hold, late)),
                 position=np.ascontiguousarray(position[1:]),
-                start=initial_state(record.time[first:last], position)[:2],
+                start=initial_state(time, position)[:2],
                 load=load[first : last - 1] if load.shape[0] > 1 else load,
                 temperature=temperature[first : last - 1] if temperature.shape[0] > 1 else temperature,
-                noise=noise_of(position),
-                effort_noise=noise_of(record.effort[first:last]),
+                noise=noise_of(position, time=time),
+                effort_noise=noise_of(effort, time=time),
                 hold=record.hold,
                 late=late,
-                between=_between(record.effort[first:last], record.hold),
+                between=_between(effort, time, record.hold),
             )
         )
     return found
@@ -155,7 +153,7 @@ def _over_intervals(effort: Array, step: Array, hold: str, late: float | None) -
     return np.asarray(np.diff(passed) / step, dtype=np.float64)
 
 
-def _between(effort: Array, hold: str) -> Array:
+def _between(effort: Array, time: Array, hold: str) -> Array:
     """What may have acted between two samples beside what these say [F], shape ``(n_samples - 1,)``.
 
     A controller faster than the log changes its force as roughly between samples as from one to the next. How roughly, high
@@ -165,10 +163,10 @@ def _between(effort: Array, hold: str) -> Array:
     """
     if hold != "linear":
         return np.zeros(effort.shape[0] - 1)
-    rough = np.diff(effort, _DIFFERENCES) ** 2 / float(comb(2 * _DIFFERENCES, _DIFFERENCES))
+    rough = noise_at_each(effort, time) ** 2
     around = np.ones(_AROUND) / _AROUND
-    local = np.convolve(np.pad(rough, _DIFFERENCES // 2, mode="edge"), around, mode="same")
-    beyond = np.maximum(local - _CHANCE * noise_of(effort) ** 2, 0.0)
+    local = np.convolve(np.pad(rough, (effort.shape[0] - rough.shape[0]) // 2, mode="edge"), around, mode="same")
+    beyond = np.maximum(local - _CHANCE * noise_of(effort, time=time) ** 2, 0.0)
     return np.sqrt(0.25 * (beyond[:-1] + beyond[1:]))
 
 

@@ -40,7 +40,7 @@ def noise_bias(model: Model, found: Equations, free: FreeParameters, weight: Arr
     random = np.random.default_rng(2)
     moved = np.zeros((2 * _DRAWS, free.index.shape[0]))
     for k in range(_DRAWS):
-        errors = [errors_like(s.raw_position, s.position, random) for s in found.stretches]
+        errors = [errors_like(s.raw_position, s.position, random, s.level) for s in found.stretches]
         for j, sign in enumerate((1.0, -1.0)):
             noisy = tuple(s.along(s.raw_position + sign * e) for s, e in zip(found.stretches, errors, strict=True))
             moved[2 * k + j, inside] = _step(model, replace(found, stretches=noisy), free.index[inside], weight)

@@ -41,7 +41,7 @@ def decimation_of(
         thin: makes rows of a signal, from edge, decimation, stretch and signal.
     """
     random = np.random.default_rng(1)
-    noisy = [s.along(s.position + errors_like(s.raw_position, s.position, random)) for s in stretches]
+    noisy = [s.along(s.position + errors_like(s.raw_position, s.position, random, s.level)) for s in stretches]
     errors = [b.acceleration - a.acceleration for a, b in zip(stretches, noisy, strict=True)]
     fastest = max(float(np.quantile(np.abs(s.velocity), 0.98)) for s in stretches)
     best, least = closest, np.inf

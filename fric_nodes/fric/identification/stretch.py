@@ -60,6 +60,7 @@ class Stretch:
         load: relative normal load [1], one value or ``(n,)``.
         temperature: [K] from reference, one value or ``(n,)``.
         smooth: the filter that the position went through.
+        level: standard deviation of the errors of a position that was sampled unevenly [x]; None: as ``raw_position`` shows.
     """
 
     time: Array
@@ -75,6 +76,7 @@ class Stretch:
     load: Array
     temperature: Array
     smooth: Callable[[Array], Array]
+    level: float | None = None
 
     def along(self, raw_position: Array) -> Stretch:
         """The same with another position signal [x], shape ``(n,)``."""
@@ -84,7 +86,7 @@ class Stretch:
     @cached_property
     def position_error(self) -> float:
         """Standard deviation of the errors of the recorded position [x]."""
-        return level_of(self.raw_position)
+        return level_of(self.raw_position) if self.level is None else self.level
 
     @cached_property
     def motion(self) -> Motion:

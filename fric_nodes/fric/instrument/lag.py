@@ -37,6 +37,8 @@ _MOST_RANGE = 80
 _SPAN = 0.1  # [s] longest growth over a recording that is looked for
 _CONTRAST = 6.0  # energy at a typical shift over the least
 _INERTIA = 3.0  # rms of the inertial force over the residual's, at least
+_STANDS_OUT = 4.0  # standard errors, beyond which a lag that can't be told is still named as a suspicion
+_TAKES = 0.8  # of the energy that the force balance leaves, the most that such a lag may leave
 _FADING = (0.03, 0.2)  # of the high speed, at which parts of friction have fallen to half
 _PER_BAND = 10.0  # steps of the grid per period of the cutoff
 
@@ -226,14 +228,27 @@ def judged(view: View, growing: bool = False) -> tuple[LagCurves | None, str]:
     if not curves.enough:
         return None, "too few sliding samples"
     if growing:
-        found: Lag | Growth = curves.growing()
-        sharp = True
-    else:
-        found = curves.constant()
-        sharp = found.contrast > _CONTRAST
-    if not (found.inertia > _INERTIA and sharp):
-        return None, "the motion has too little acceleration: a lag would hardly change the force"
-    return curves, ""
+        inertia = curves.growing().inertia
+        return (curves, "") if inertia > _INERTIA else (None, _too_little(inertia))
+    found = curves.constant()
+    if found.inertia > _INERTIA and found.contrast > _CONTRAST:
+        return curves, ""
+    why = _too_little(found.inertia)
+    if found.inertia > _INERTIA:
+        why = "the force balance closes nearly as well at any lag"
+    if not found.at_edge and abs(found.value) > _STANDS_OUT * found.error and found.left < _TAKES:
+        side = "effort" if found.value > 0.0 else "motion"
+        why += f"; it would leave {100.0 * (1.0 - found.left):.2g} % less energy if the {side} came late, by "
+        why += f"{1e3 * abs(found.value):.3g} ms: compare the clocks"
+    return None, why
+
+
+def _too_little(inertia: float) -> str:
+    """Why a lag can't be seen, with an inertial force of its own of ``inertia`` times what the force balance leaves."""
+    return (
+        f"the force that only the acceleration explains is {max(inertia, 0.0):.2g} times what the force balance leaves; "
+        f"to tell a lag takes {_INERTIA:.2g} times"
+    )
 
 
 def _columns(view: View, at: Index) -> Array:

@@ -117,7 +117,7 @@ class View:
     @cached_property
     def noise(self) -> float:
         """Standard deviation of the errors of the position, steps included [x]."""
-        return level_of(self.record.position)
+        return level_of(self.record.position, self.record.time)
 
     def low_pass(self, values: Array, cutoff: float | None = None) -> Array:
         """``values``, shape ``(n,)``, through the filter of the view, or to another ``cutoff`` [Hz]."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from ..record import Record
 from .effort_wrap import unwrapped
 from .folds import unfolded
+from .held_position import updated
 from .hold import resolved
 from .spikes import without_spikes
 from .stamps import evened
@@ -20,14 +21,14 @@ _NOTES = ("position jumps", "effort jumps", "spike")  # how the notes of these b
 
 
 def conditioned(record: Record) -> Record:
-    """``record`` with folds and spikes put right, the stamps that its motion has and the hold of its force found.
+    """``record`` with folds and spikes put right, repeated positions left out, the stamps that its motion has and the hold of its force found.
 
     Each change is among its notes.
 
     Raises:
         RecordError: a position jumps in a way that no motion and no known fold makes.
     """
-    return resolved(evened(_signals(record)))
+    return resolved(evened(updated(_signals(record))))
 
 
 def changes(record: Record) -> tuple[str, ...]:

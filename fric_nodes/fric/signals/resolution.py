@@ -5,7 +5,9 @@ steps at most where there are enough samples; it is then sharpened over longer a
 is known no better than floating point and unit conversions leave it.
 
 The noise is taken from high differences, in which no smooth motion survives: of white noise of standard deviation s the d-th
-difference has s sqrt(binomial(2 d, d)). The median makes it a matter of the usual sample, whatever happens at a few.
+difference has s sqrt(binomial(2 d, d)). The median makes it a matter of the usual sample, whatever happens at a few. Where
+samples were taken unevenly, by 10 and 12 ms in turn, say, plain differences would take the motion between them for noise;
+divided differences at the samples' own times take that off.
 """
 
 from __future__ import annotations
@@ -13,13 +15,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import comb
 
 from ..record import Array, Mask
 
-__all__ = ["noise_of", "step_of"]
+__all__ = ["noise_at_each", "noise_of", "step_of"]
 
 _DIFFERENCES = 6  # of a signal, which leave its white noise and hardly any of its motion
+_EVEN = 1e-3  # of a step, by which steps may differ and count as even
 _ALIKE = 1.2  # times the least gap: gaps of one step differ by no more, those of two by more
 _WHOLE = 0.05  # of a step, off the next whole number of steps: what rounding in a file or a unit leaves
 _MOSTLY = 0.95  # share of the gaps that have to be whole
@@ -51,17 +55,37 @@ def step_of(values: Array) -> float:
         reach *= _SHARPENED
 
 
-def noise_of(signal: Array, where: Mask | None = None) -> float:
+def noise_of(signal: Array, where: Mask | None = None, time: Array | None = None) -> float:
     """Standard deviation of the white noise of ``signal``, shape ``(n,)``, in its unit, from sixth differences.
 
     Args:
         signal: all of it.
         where: True for the samples of which it is told, shape ``(n,)``; None: for all.
+        time: when its samples were taken [s], growing, shape ``(n,)``; None: evenly.
     """
     if signal.shape[0] <= _DIFFERENCES:
         return 0.0
-    gain = math.sqrt(float(comb(2 * _DIFFERENCES, _DIFFERENCES)))
-    sizes = np.abs(np.diff(signal, _DIFFERENCES))
+    sizes = np.abs(noise_at_each(signal, time))
     if where is not None:
         sizes = sizes[where[_DIFFERENCES // 2 : -_DIFFERENCES // 2]]
-    return float(np.median(sizes)) / (0.6745 * gain) if sizes.size else 0.0
+    return float(np.median(sizes)) / 0.6745 if sizes.size else 0.0
+
+
+def noise_at_each(signal: Array, time: Array | None = None) -> Array:
+    """Sixth differences of ``signal``, shape ``(n,)``, with the variance of its white noise, shape ``(n - 6,)``.
+
+    Args:
+        signal: all of it.
+        time: as for :func:`noise_of`.
+    """
+    step = None if time is None else np.diff(time)
+    if step is None or float(np.ptp(step)) < _EVEN * float(np.median(step)):
+        return np.asarray(np.diff(signal, _DIFFERENCES) / math.sqrt(float(comb(2 * _DIFFERENCES, _DIFFERENCES))))
+    points, values = (sliding_window_view(each, _DIFFERENCES + 1).T for each in (time / np.median(step), signal))
+    taken, size = np.zeros(points.shape[1]), np.zeros(points.shape[1])
+    for k, (at, value) in enumerate(zip(points, values, strict=True)):
+        # Of the divided difference, Abramowitz and Stegun 25.1.5.
+        weight = 1.0 / np.prod(at - np.delete(points, k, axis=0), axis=0)
+        taken += weight * value
+        size += weight**2
+    return np.asarray(taken / np.sqrt(size))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...signals.held_position import NOTE
 from ...signals.stamps import grid_of, is_jitter
 from ..check import Check, Evidence, Finding, Verdict, each
 from ..view import View, runs
@@ -68,7 +69,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
     if uneven > _JITTER and not unevenly:
         parts.append(f"stamps jitter by {100 * uneven:.0f} % of a step")
     # What was made of them when the recording was made ready for use.
-    parts += [note for note in view.record.notes if note.startswith(("stamps jitter", "the stamps"))]
+    parts += [note for note in view.record.notes if note.startswith(("stamps jitter", "the stamps", NOTE))]
     bad = share > _FAULT or (uneven > _JITTER_FAULT and not unevenly)
     verdict: Verdict = "fault" if bad else "warning" if parts else "ok"
     remedy = "record on the machine that reads the sensor, stamp at the source; --time log may be more even"
