@@ -57,7 +57,7 @@ def test_drawn_errors_are_as_large_as_those_of_the_instrument() -> None:
 
 
 def test_samples_taken_unevenly_are_no_noise() -> None:
-    """A controller of 500 Hz logged every 10 or 12 ms; its noise is still told, at its own times, and the smooth motion isn't."""
+    """A controller of 500 Hz logged every 10 or 12 ms: its noise is told, and the motion between samples is none."""
     rng = np.random.default_rng(8)
     time = np.cumsum(rng.choice([0.010, 0.012], size=6000))
     smooth = 1.5 * np.sin(2.0 * np.pi * 0.3 * time)

@@ -21,7 +21,7 @@ _NOTES = ("position jumps", "effort jumps", "spike")  # how the notes of these b
 
 
 def conditioned(record: Record) -> Record:
-    """``record`` with folds and spikes put right, repeated positions left out, the stamps that its motion has and the hold of its force found.
+    """``record`` with folds and spikes put right, its motion at its own updates and stamps, and the hold of its force found.
 
     Each change is among its notes.
 

@@ -48,15 +48,18 @@ def updated(record: Record) -> Record:
         f"{NOTE} every {every:.3g} samples ({period:.3g} ms) only, and repeated between: the samples between updates were "
         "left out, the mean force over them kept; log at the rate at which the sensor is read"
     )
-    changed = {
-        "position": record.position[fresh],
-        "effort": effort,
-        "velocity": kept(record.velocity),
-        "reference": kept(record.reference),
-        "valid": None if record.valid is None else np.logical_and.reduceat(record.valid, fresh),
-        "extra": {name: signal[fresh] for name, signal in record.extra.items()},
-    }
-    return replace(record, time=record.time[fresh], effort_hold="following", notes=(*record.notes, note), **changed)
+    return replace(
+        record,
+        time=record.time[fresh],
+        position=record.position[fresh],
+        effort=effort,
+        velocity=kept(record.velocity),
+        reference=kept(record.reference),
+        valid=None if record.valid is None else np.logical_and.reduceat(record.valid, fresh),
+        extra={name: signal[fresh] for name, signal in record.extra.items()},
+        effort_hold="following",
+        notes=(*record.notes, note),
+    )
 
 
 def _update(record: Record) -> float | None:
@@ -73,7 +76,6 @@ def _update(record: Record) -> float | None:
     n_changes = int(np.sum(changes))
     if n_changes < _FEWEST or 1.0 - n_changes / at.size < _REPEATED:
         return None
-    # An effort that stands with it is a sample that was logged again, or one of a slower log that was filled up.
     alone = float(np.mean(q[at[changes] + 1] == q[at[changes]]))
     return at.size / n_changes if alone > _ALONE else None
 

@@ -194,5 +194,16 @@ def resolved(record: Record) -> Record:
     kind = {0.5: "following", -0.5: "preceding"}.get(late, "linear") if found.kind == "delayed" else found.kind
     if kind in _CLASSES:
         return replace(settled, effort_hold=kind)
-    moved = make_interp_spline(record.time, record.effort, 3)(record.time - late * found.sample_time)
-    return replace(settled, effort=np.asarray(moved), effort_hold="linear")
+    return replace(settled, effort=_moved(record, late * found.sample_time), effort_hold="linear")
+
+
+def _moved(record: Record, late: float) -> Array:
+    """The effort of ``record``, later by ``late`` [s], by a cubic, shape ``(n,)`` [F].
+
+    What is level stays so, and nothing passes the recorded extremes: a force at a limit stays recognisable.
+    """
+    time, effort = record.time, record.effort
+    at = time - late
+    before = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.shape[0] - 2)
+    level = effort[before] == effort[before + 1]
+    return np.where(level, effort[before], np.clip(make_interp_spline(time, effort, 3)(at), np.min(effort), np.max(effort)))

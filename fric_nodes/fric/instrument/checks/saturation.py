@@ -2,8 +2,8 @@
 
 A smooth peak is as flat as that near its top, but it widens: the time that a parabola spends within four tolerances of its
 top is twice the time within one, that of a clipped signal hardly longer. A force that is held while the axis rests or moves
-steadily (a deflection before a release, friction in a slow stroke) is level by nature, and one that has levels of its own
-(switched, or stepped) is meant so. Where the force balance of the axis holds at the limit as well as elsewhere, the force
+steadily (a deflection before a release, friction in a slow stroke) is level by nature, unless it has noise on it everywhere but
+there: noise doesn't stop by itself. One that has levels of its own (switched, or stepped) is meant so. Where the force balance of the axis holds at the limit as well as elsewhere, the force
 recorded is the one that acted, and nothing is wrong with the recording: the drive was at its limit. Where it doesn't, the
 sensor was at its own, or the command was recorded and not the force. The value is the share of the recording that is spent at
 a limit.
@@ -29,6 +29,7 @@ _FEWEST = 5  # samples
 _EXACT = 1e-4  # of the force range: tolerance of a plateau without noise
 _FLAT = 0.005  # the same with noise, at least
 _COARSE = 0.05  # the same, at most
+_ALIVE = 4.0  # times that tolerance: with so much noise, from sample to sample, a force can't be exactly level by nature
 _RARE = 0.4  # share of a recording up to which plateaus are a limit and not the excitation
 _WIDENING = 1.4  # between 1 for a clipped signal and 2 for a parabola
 _STEADY = 0.08  # of the recording's high speed: change of speed within a plateau, or beside it
@@ -57,17 +58,19 @@ def plateaus(view: View) -> list[Plateau]:
     velocity = np.interp(time, np.arange(view.n) * view.h, view.velocity)
     # A sensor's limit is exact, a drive's has the noise of its measurement on it.
     noise = 1.4826 * float(np.median(np.abs(np.diff(effort, 2)))) / np.sqrt(6.0)
-    for tolerance in (_EXACT * spread, max(_FLAT * spread, 3.0 * noise)):
+    exact = _EXACT * spread
+    for tolerance in (exact, max(_FLAT * spread, 3.0 * noise)):
+        cut_off = tolerance == exact and noise > _ALIVE * exact
         found: list[Plateau] = []
         if tolerance > _COARSE * spread:
             continue
         for extreme in (float(np.min(effort)), float(np.max(effort))):
             for first, last, level in _flat(effort, extreme, tolerance):
                 long_enough = time[last - 1] - time[first] >= _SHORTEST and last - first >= _FEWEST
-                if long_enough and float(np.ptp(velocity[first:last])) > _STEADY * view.speed:
+                if long_enough and (cut_off or float(np.ptp(velocity[first:last])) > _STEADY * view.speed):
                     found.append(Plateau(first, last, level))
         total = sum(last - first for first, last, _ in found)
-        if found and total <= _RARE * record.n_samples and not _levels(effort, found, tolerance):
+        if found and (cut_off or total <= _RARE * record.n_samples) and not _levels(effort, found, tolerance):
             return found
     return []
 
