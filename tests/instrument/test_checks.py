@@ -260,6 +260,26 @@ def test_saturated_sensor_and_drive_at_its_limit(clean: Record) -> None:
     assert clipped.time
 
 
+def test_a_noisy_force_that_is_level_at_its_limit_is_cut_off_at_constant_speed_too() -> None:
+    rng = np.random.default_rng(6)
+    time = 2e-3 * np.arange(20_000)
+    stroke = np.where(time % 8.0 < 4.0, 1.0, -1.0)
+    speed = (
+        stroke
+        * (0.3 + 0.2 * np.floor(time / 8.0) / 4.0)
+        * np.clip((time % 4.0) / 0.2, 0.0, 1.0)
+        * np.clip((4.0 - time % 4.0) / 0.2, 0.0, 1.0)
+    )
+    position = np.cumsum(speed) * 2e-3
+    force = 10.0 * np.gradient(speed, 2e-3) + 8.0 * np.tanh(speed / 1e-3) + 40.0 * speed + 0.3 * rng.standard_normal(time.size)
+    free = Record(time, position, force)
+    assert found("saturation", free).verdict == "ok"
+    finding = found("saturation", replace(free, effort=np.clip(force, -24.0, 24.0)))
+    assert finding.verdict in {"warning", "fault"}
+    assert "24" in finding.detail
+    assert finding.value > 0.2
+
+
 def test_two_sensors(clean: Record) -> None:
     assert clean.velocity is not None
     load = clean.position - 5e-4 * np.sign(clean.velocity)

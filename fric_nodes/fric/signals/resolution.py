@@ -78,10 +78,10 @@ def noise_at_each(signal: Array, time: Array | None = None) -> Array:
         signal: all of it.
         time: as for :func:`noise_of`.
     """
-    step = None if time is None else np.diff(time)
-    if step is None or float(np.ptp(step)) < _EVEN * float(np.median(step)):
+    usual = 0.0 if time is None else float(np.median(np.diff(time)))
+    if time is None or float(np.ptp(np.diff(time))) < _EVEN * usual:
         return np.asarray(np.diff(signal, _DIFFERENCES) / math.sqrt(float(comb(2 * _DIFFERENCES, _DIFFERENCES))))
-    points, values = (sliding_window_view(each, _DIFFERENCES + 1).T for each in (time / np.median(step), signal))
+    points, values = (sliding_window_view(each, _DIFFERENCES + 1).T for each in (time / usual, signal))
     taken, size = np.zeros(points.shape[1]), np.zeros(points.shape[1])
     for k, (at, value) in enumerate(zip(points, values, strict=True)):
         # Of the divided difference, Abramowitz and Stegun 25.1.5.

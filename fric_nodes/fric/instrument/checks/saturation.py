@@ -3,10 +3,10 @@
 A smooth peak is as flat as that near its top, but it widens: the time that a parabola spends within four tolerances of its
 top is twice the time within one, that of a clipped signal hardly longer. A force that is held while the axis rests or moves
 steadily (a deflection before a release, friction in a slow stroke) is level by nature, unless it has noise on it everywhere but
-there: noise doesn't stop by itself. One that has levels of its own (switched, or stepped) is meant so. Where the force balance of the axis holds at the limit as well as elsewhere, the force
-recorded is the one that acted, and nothing is wrong with the recording: the drive was at its limit. Where it doesn't, the
-sensor was at its own, or the command was recorded and not the force. The value is the share of the recording that is spent at
-a limit.
+there: noise doesn't stop by itself. One that has levels of its own (switched, or stepped) is meant so. Where the force balance
+of the axis holds at the limit as well as elsewhere, the force recorded is the one that acted, and nothing is wrong with the
+recording: the drive was at its limit. Where it doesn't, the sensor was at its own, or the command was recorded and not the
+force. The value is the share of the recording that is spent at a limit.
 """
 
 from __future__ import annotations
