@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fric.instrument import CHECKS, Evidence, Finding, inspect
 from fric.model import Model, build_model, term
-from fric.record import Record
+from fric.record import Record, Units
 
 Write = Callable[..., Record]
 
@@ -320,3 +320,23 @@ def test_an_effort_that_never_changes_may_be_right(clean: Record) -> None:
     coasting = Record(time, 1.0 - np.exp(-time), np.zeros(4000))
     assert found("frozen", coasting).verdict == "unknown"
     assert found("frozen", replace(clean, effort=np.zeros(clean.n_samples))).verdict == "fault"
+
+
+def test_the_weight_of_an_arm_is_told_from_friction() -> None:
+    rng = np.random.default_rng(4)
+    time = 5e-3 * np.arange(8000)
+    angle = 1.4 * np.sin(0.7 * time) + 0.8 * np.sin(1.9 * time + 1.0)
+    speed, acceleration = np.gradient(angle, 5e-3), np.gradient(np.gradient(angle, 5e-3), 5e-3)
+    torque = 0.05 * acceleration + 0.4 * np.sign(speed) + 0.1 * speed + 0.02 * rng.standard_normal(time.size)
+    level = Record(time, angle, torque, units=Units("rad", "N m"))
+    hanging = replace(level, effort=torque + 3.3 * np.sin(angle + 0.3))
+    assert "weight" not in found("offset", level).detail
+    finding = found("offset", hanging)
+    assert finding.verdict == "ok"
+    assert "weight" in finding.detail
+    assert "3.3" in finding.detail
+    # Without it the friction along the motion would be anything.
+    for record in (level, hanging):
+        assert found("effort_sign", record).value == pytest.approx(0.4 + 0.1 * float(np.mean(np.abs(speed))), rel=0.1)
+    # Along a line there are no arms.
+    assert "weight" not in found("offset", replace(hanging, units=Units("m", "N"))).detail

@@ -1,7 +1,8 @@
 """Lag of the effort against the motion, constant and growing, from the force balance alone.
 
-The effort, shifted by tau, is fitted by what a motion needs: m a, a cubic of the position (springs, an arm's weight) and, for
-each direction, a constant, a viscous and a quadratic part and two that fade with speed. The tau that leaves least is the lag.
+The effort, shifted by tau, is fitted by what a motion needs: m a, a cubic of the position (springs), the weight of an arm where
+one shows and, for each direction, a constant, a viscous and a quadratic part and two that fade with speed. The tau that leaves
+least is the lag.
 Only sliding samples count, so that pre-sliding and play after a reversal, which lag behind by themselves, stay out. The sums
 are kept per window, so that a lag that grows, and intervals by the jackknife over windows, need no second pass.
 
@@ -263,7 +264,9 @@ def _columns(view: View, at: Index) -> Array:
     parts = [np.ones(view.n), speed, speed**2, *(1.0 / (1.0 + speed / low) for low in _FADING)]
     ways = [view.velocity > 0.0, view.velocity < 0.0]
     friction = [view.low_pass(way * part)[at] for way in ways if np.any(way) for part in parts]
-    stacked = np.column_stack([view.acceleration[at], q, q**2, q**3, *friction])
+    angle = view.position[at]
+    weight = [np.sin(angle), np.cos(angle)] if np.any(view.weight) else []
+    stacked = np.column_stack([view.acceleration[at], q, q**2, q**3, *weight, *friction])
     size = np.sqrt(np.mean(stacked**2, axis=0)) if at.size else np.ones(stacked.shape[1])
     size[size == 0.0] = 1.0
     return np.asarray(stacked / size)

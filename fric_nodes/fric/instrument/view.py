@@ -28,11 +28,16 @@ _SLIDING = 0.05  # of the recording's high speed
 _CLUSTERS = 20  # of a recording, for standard errors
 _SURE = 4.0  # standard errors
 _STANDS_OUT = 2.0  # times the residual
+_WEIGHS = 0.5  # of the energy that the balance leaves without an arm's weight, the most that it may leave with one
+_QUARTER_TURN = 0.5 * np.pi  # [rad]: over less a weight is hardly told from a spring
+_FEWEST_OF_WEIGHT = 100  # samples
 _AFTER_REVERSAL = 0.03  # of a typical stroke: pre-sliding, and what a play takes
 
 
 class Balance(NamedTuple):
     """Force balance of the sliding samples, u = m a + F sgn v + c v + b + k (q - q_mean); NaN where it can't be made.
+
+    Of a joint that carries an arm, the arm's weight is taken off u before.
 
     Attributes:
         names: ``mass``, ``coulomb``, ``viscous``, ``bias``, ``stiffness``.
@@ -226,6 +231,26 @@ class View:
         return np.asarray(self.moving & self.usable & (way > _AFTER_REVERSAL * stroke))
 
     @cached_property
+    def weight(self) -> Array:
+        """Torque of an arm's weight, A sin q + B cos q [F], shape ``(n,)``; zero unless it explains far more than a spring."""
+        at = np.flatnonzero(self.sliding)
+        q = self.position
+        if self.record.units.position != "rad" or at.size < _FEWEST_OF_WEIGHT or float(np.ptp(q[at])) < _QUARTER_TURN:
+            return np.zeros(self.n)
+        turning = np.column_stack([np.sin(q), np.cos(q)])
+        columns = _columns(self, at)
+        kept = np.column_stack([columns[:, :-1], turning[at]])
+        found, left = (_least_squares(each, self.effort[at]) for each in (kept, columns))
+        if found[1] > _WEIGHS * left[1]:
+            return np.zeros(self.n)
+        return np.asarray(turning @ found[0][-2:])
+
+    @cached_property
+    def free_effort(self) -> Array:
+        """The filtered effort less the weight of an arm [F], shape ``(n,)``."""
+        return self.effort - self.weight
+
+    @cached_property
     def balance(self) -> Balance:
         """Force balance of the sliding samples."""
         return balance_on(self, np.flatnonzero(self.sliding))
@@ -241,8 +266,9 @@ def balance_on(view: View, at: Index) -> Balance:
     size[size == 0.0] = 1.0
     scaled = columns / size
     inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10, hermitian=True)
-    values = inverse @ (scaled.T @ view.effort[at])
-    residual = view.effort[at] - scaled @ values
+    effort = view.free_effort[at]
+    values = inverse @ (scaled.T @ effort)
+    residual = effort - scaled @ values
     # Clusters as long as the slowest thing in the residual can be: a twentieth of the recording.
     cluster = at * _CLUSTERS // view.n
     score = np.zeros((_CLUSTERS, 5))
@@ -257,6 +283,13 @@ def balance_on(view: View, at: Index) -> Balance:
     own = np.abs(values) / np.sqrt(np.maximum(np.diag(inverse), 1e-300) * at.size)
     spread = covariance / np.outer(size, size)
     return Balance(_NAMES, values / size, errors / size, rms, np.abs(values), int(at.size), spread, own)
+
+
+def _least_squares(columns: Array, target: Array) -> tuple[Array, float]:
+    """Coefficients of ``columns``, and the sum of squares that they leave of ``target``."""
+    size = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
+    found = np.linalg.lstsq(columns / size, target, rcond=1e-10)[0]
+    return found / size, float(np.sum((target - (columns / size) @ found) ** 2))
 
 
 def _columns(view: View, at: Index) -> Array:
@@ -276,7 +309,7 @@ def imbalance(view: View, without: Mask) -> tuple[Array, Array]:
     at = np.flatnonzero(view.sliding)
     if np.all(np.isfinite(found.values)):
         columns = _columns(view, at)
-        left[at] = view.effort[at] - columns @ found.values
+        left[at] = view.free_effort[at] - columns @ found.values
         if np.all(np.isfinite(found.covariance)):
             error[at] = np.sqrt(np.maximum(np.sum((columns @ found.covariance) * columns, axis=1), 0.0))
     return left, error
@@ -297,7 +330,7 @@ def friction_along(view: View) -> tuple[float, float, float]:
     if not _RARER < float(np.mean(v > 0.0)) < 1.0 - _RARER:
         return float("nan"), float("nan"), float("nan")
     other = found.value("mass") * view.acceleration[at] + found.value("bias") + found.value("stiffness") * q
-    mean = float(np.mean(np.sign(v) * (view.effort[at] - other)))
+    mean = float(np.mean(np.sign(v) * (view.free_effort[at] - other)))
     # The same mean by the balance's own terms: its residual is orthogonal to sgn v.
     slope = np.array([0.0, 1.0, float(np.mean(np.abs(v))), 0.0, 0.0])
     known = bool(np.all(np.isfinite(found.covariance)))

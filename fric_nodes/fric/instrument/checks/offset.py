@@ -34,11 +34,23 @@ def _judge(view: View, evidence: Evidence) -> Finding:
             "offset", "unknown", "a spring acts: without its relaxed position no offset can be determined", value, unit
         )
     if abs(excess) < _WARNING * friction or abs(excess) < 4.0 * error:
-        return Finding("offset", "ok", f"constant force of {value:.3g} {unit}, small beside friction", value, unit, interval)
+        detail = f"constant force of {value:.3g} {unit}, small beside friction" + _of_weight(view)
+        return Finding("offset", "ok", detail, value, unit, interval)
     detail = f"a constant force of {value:.3g} {unit} beside a friction of {friction:.3g} {unit}"
-    detail += ": gravity, or an offset of the sensor"
+    detail += ": gravity, or an offset of the sensor" + _of_weight(view)
     remedy = "zero the force signal with the axis unloaded, or keep a 'bias' term in the model"
     return Finding("offset", "warning", detail, value, unit, interval, remedy, correction=Correction(effort_offset=-excess))
+
+
+def _of_weight(view: View) -> str:
+    """What there is to say of an arm's weight."""
+    largest = float(np.max(np.abs(view.weight)))
+    if largest == 0.0:
+        return ""
+    return (
+        f"; beside it a force goes with the angle as an arm's weight does, {largest:.3g} {view.record.units.force} at most: a "
+        "model of this joint needs it (the plant 'pendulum', or the effect 'ripple' with its period held at one turn)"
+    )
 
 
 CHECK = Check("offset", "offset of the force", "sliding in both directions", each(_judge))

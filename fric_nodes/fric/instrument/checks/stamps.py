@@ -77,7 +77,7 @@ def _judge(view: View, evidence: Evidence) -> Finding:
         remedy = ""
     elif unevenly and verdict == "warning":
         remedy = "read the sensor in a loop of an even period; until then fits interpolate between the samples"
-    detail = "; ".join(parts) or f"even to {100 * uneven:.1g} % of a step, nothing missing"
+    detail = "; ".join(parts) or f"even to {float(f'{100 * uneven:.1g}'):g} % of a step, nothing missing"
     return Finding("stamps", verdict, detail, share, "1", remedy=remedy, time=gaps)
 
 
