@@ -67,7 +67,9 @@ def plateaus(view: View) -> list[Plateau]:
         for extreme in (float(np.min(effort)), float(np.max(effort))):
             for first, last, level in _flat(effort, extreme, tolerance):
                 long_enough = time[last - 1] - time[first] >= _SHORTEST and last - first >= _FEWEST
-                if long_enough and (cut_off or float(np.ptp(velocity[first:last])) > _STEADY * view.speed):
+                # Exactly zero is a drive that is switched off.
+                level_by_limit = cut_off and level != 0.0
+                if long_enough and (level_by_limit or float(np.ptp(velocity[first:last])) > _STEADY * view.speed):
                     found.append(Plateau(first, last, level))
         total = sum(last - first for first, last, _ in found)
         if found and (cut_off or total <= _RARE * record.n_samples) and not _levels(effort, found, tolerance):
