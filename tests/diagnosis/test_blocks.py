@@ -34,7 +34,7 @@ def test_what_was_invalid_stays_invalid_in_both() -> None:
     assert int(np.sum(learnt[0].mask)) + int(np.sum(apart[0].mask)) == 700
 
 
-@pytest.mark.parametrize(("n", "advice"), [(1000, "ask for 2 to 5 blocks"), (399, "record for longer")])
+@pytest.mark.parametrize(("n", "advice"), [(1000, "ask for 5 blocks"), (399, "record for longer")])
 def test_blocks_that_are_too_short_are_refused_with_what_to_do(n: int, advice: str) -> None:
     with pytest.raises(RecordError, match=advice):
         in_blocks([swinging(n)], 6)
@@ -50,6 +50,17 @@ def test_blocks_in_step_with_the_motion_are_refused() -> None:
     there = np.linspace(0.0, 1.0, 250)
     with pytest.raises(RecordError, match=r"to learn from hardly moves backward \(0 % of its way\).*\(100 %\)"):
         in_blocks([record(np.concatenate([there, there[::-1], there, there[::-1]]))], 4)
+
+
+def test_what_is_offered_instead_can_be_used() -> None:
+    """Back and forth twice in 1000 samples: 2 and 4 blocks are in step with that, and there is room for 5."""
+    there = np.linspace(0.0, 1.0, 250)
+    whole = record(np.concatenate([there, there[::-1], there, there[::-1]]))
+    for asked, offered in ((4, "3 or 5"), (6, "5"), (1, "2")):
+        with pytest.raises(RecordError, match=f"ask for {offered} blocks"):
+            in_blocks([whole], asked)
+    for good in (2, 3, 5):
+        in_blocks([whole], good)
 
 
 def test_what_does_not_move_is_not_one_sided() -> None:

@@ -99,9 +99,9 @@ def test_blocks_share_no_sample_and_keep_the_time() -> None:
     assert {999, 1999, 2999} <= set(edges.tolist())
 
 
-@pytest.mark.parametrize("n_blocks", [1, 21, 0])
-def test_blocks_that_hold_too_little_are_refused(n_blocks: int) -> None:
-    with pytest.raises(RecordError, match="ask for 2 to 20 blocks"):
+@pytest.mark.parametrize(("n_blocks", "good"), [(1, 2), (21, 20), (0, 2)])
+def test_blocks_that_hold_too_little_are_refused(n_blocks: int, good: int) -> None:
+    with pytest.raises(RecordError, match=f"ask for {good} blocks"):
         in_blocks([strokes(20.0, True, 6)], n_blocks)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import fric
 import numpy as np
@@ -104,6 +105,27 @@ def test_what_is_not_recorded_has_no_limit_and_says_why(limits: dict[str, Limit]
     assert limits["temperature"].size is None
     assert "hold nothing" in limits["temperature"].why
     assert "coulomb" not in limits
+
+
+def test_a_force_larger_than_any_there_is_no_limit() -> None:
+    track, state = followed(recording())
+    loud = replace(state, fit=replace(state.fit, solution=_scaled(state, 3000.0)))
+    tried = screen(track, state.fit, candidates(state.fit.model, scales_of(track)), state.chance, in_pairs=False).tried
+    peak = max(float(np.max(np.abs(run.effort))) for run in track.runs)
+    found = {each.effect: each for each in limits_of(track, loud, tried, Units(), anything=False)}
+    assert "larger than any force" in found["bias"].why
+    assert found["bias"].size is None
+    forces = [each for each in found.values() if each.unit == "N" and not each.softer and each.size is not None]
+    assert all((each.size or 0.0) <= peak for each in forces)
+
+
+def _scaled(state: State, by: float) -> Any:
+    return replace(state.fit.solution, residual=by * state.fit.residual)
+
+
+def test_a_size_is_printed_in_full() -> None:
+    assert Limit("bias", "offset", "force", 123.4, False, "N", "").sentence == "offset above 120 N (force)"
+    assert Limit("ripple", "ripple", "cosine", 1.2e-5, False, "N", "").stated == "1.2e-05 N (cosine)"
 
 
 @pytest.mark.parametrize(

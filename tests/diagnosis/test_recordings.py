@@ -14,7 +14,7 @@ from fric.model_file import read_model
 from fric.record import Record, Units
 from scipy.io import loadmat
 
-pytestmark = pytest.mark.real_data
+pytestmark = [pytest.mark.real_data, pytest.mark.timeout(900)]  # a slow machine takes minutes for the longest
 PUBLISHED = Path(__file__).parents[2] / "config" / "published"
 
 

@@ -25,20 +25,44 @@ def in_blocks(records: Sequence[Record], n_blocks: int) -> tuple[list[Record], l
     Raises:
         RecordError: a record is too short for as many blocks, or goes back and forth in step with them.
     """
+    if n_blocks < 2 or n_blocks > _most(records):
+        shortest = min(records, key=lambda each: each.time.shape[0])
+        what = f"{n_blocks} blocks of its {shortest.time.shape[0]} samples can't be diagnosed"
+        raise RecordError(shortest.source, what, _instead(records, n_blocks))
+    learnt, kept_apart = _halves(records, n_blocks)
+    problem = one_sided(learnt, kept_apart)
+    if problem:
+        raise RecordError(records[0].source, f"in {n_blocks} blocks {problem}", _instead(records, n_blocks))
+    return learnt, kept_apart
+
+
+def _halves(records: Sequence[Record], n_blocks: int) -> tuple[list[Record], list[Record]]:
+    """The odd blocks of each record, and the even ones."""
     learnt, kept_apart = [], []
     for record in records:
         n = record.time.shape[0]
-        if n_blocks < 2 or n // n_blocks < _SHORTEST:
-            most = n // _SHORTEST
-            what = f"{n_blocks} blocks of its {n} samples can't be diagnosed"
-            raise RecordError(record.source, what, f"ask for 2 to {most} blocks" if most > 1 else "record for longer")
         odd = (np.arange(n) * n_blocks // n) % 2 == 0
         learnt.append(replace(record, valid=record.mask & odd))
         kept_apart.append(replace(record, valid=record.mask & ~odd))
-    problem = one_sided(learnt, kept_apart)
-    if problem:
-        raise RecordError(records[0].source, f"in {n_blocks} blocks {problem}", "ask for another number of blocks")
     return learnt, kept_apart
+
+
+def _most(records: Sequence[Record]) -> int:
+    """Blocks that the shortest record has samples for."""
+    return min(len(record.time) for record in records) // _SHORTEST
+
+
+def _instead(records: Sequence[Record], n_blocks: int) -> str:
+    """What could be asked for instead of ``n_blocks``: the nearest numbers that can be used."""
+
+    def usable(n: int) -> bool:
+        return not one_sided(*_halves(records, n))
+
+    most = _most(records)
+    fewer = next(filter(usable, range(min(n_blocks - 1, most), 1, -1)), None)
+    more = next(filter(usable, range(max(n_blocks + 1, 2), most + 1)), None)
+    good = " or ".join(str(n) for n in (fewer, more) if n is not None)
+    return f"ask for {good} blocks" if good else "record for longer, with motion in both directions all the time"
 
 
 def one_sided(train: Sequence[Record], validation: Sequence[Record]) -> str:

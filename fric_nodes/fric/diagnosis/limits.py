@@ -11,7 +11,8 @@ Of rivals, what the best of them can't do of c must bring twenty to one. Where i
 perhaps as that other one.
 
 What the model leaves may hold some of an effect that was not found, because nothing singles it out there. The size at which it
-would take most of that away is added: so much of it may be there already.
+would take most of that away is added: so much of it may be there already. A force that would have to be larger than any of the
+recordings is no limit: it could not have been there.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ _STEP = 30.0  # numerical: of one step towards the limit
 _ROUNDS = 8  # numerical
 _BEYOND = "shows only where the command goes beyond it"
 _THE_SAME = "the fitted parameters do the same on these motions"
+_TOO_LARGE = "would have to be larger than any force of these recordings"
 
 
 @dataclass(frozen=True)
@@ -97,8 +99,8 @@ class Limit:
         """The size, with its unit and the parameter that it is one of; empty where no size can be stated."""
         if self.size is None:
             return ""
-        size = f"{self.size:.2g}" if self.unit == "1" else f"{self.size:.2g} {self.unit}"
-        return f"{size} ({self.parameter})"
+        size = f"{float(f'{self.size:.2g}'):g}"
+        return f"{size} ({self.parameter})" if self.unit == "1" else f"{size} {self.unit} ({self.parameter})"
 
 
 def limits_of(track: Track, state: State, tried: Sequence[Tried], units: Units, *, anything: bool) -> tuple[Limit, ...]:
@@ -252,6 +254,8 @@ class _Search:
     def _stated(self, held: Term, strength: str, *, softer: bool, like: str) -> Limit:
         """The limit that ``held`` has the size of, by its parameter ``strength``."""
         at = [p.name for p in held.effect.parameters].index(strength)
+        if held.effect.parameters[at].dimension == "F" and not softer and abs(held.values[at]) > self.track.largest_force:
+            return _none(held.effect, _TOO_LARGE)
         unit = held.effect.parameters[at].unit(self.units)
         return Limit(held.effect.id, held.effect.title, strength, held.values[at], softer, unit, "", like, held)
 

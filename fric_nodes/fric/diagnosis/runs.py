@@ -102,6 +102,11 @@ class Runs:
             late,
         )
 
+    @property
+    def largest_force(self) -> float:
+        """The largest force, either way, of the recordings [F]."""
+        return max(float(np.max(np.abs(run.effort))) for run in self.runs)
+
     def parts(self: Same, spans: Sequence[tuple[int, int, int]]) -> Same:
         """The parts of the recordings in ``spans``: run, first and last interval (exclusive) of each."""
         runs, time, leads, pasts = [], [], [], []

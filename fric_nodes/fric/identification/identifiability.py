@@ -184,7 +184,7 @@ def _finding(found: _Found, problem: Problem, together: Array, motion: str, tria
     joined = ", ".join(names[:-1]) + f" and {names[-1]}" if len(names) > 1 else names[0]
     if found.kind == "unseen":
         effect = _effect(problem.model, names[0])
-        where = f" (it shows at {effect.regime})" if effect is not None and effect.regime else ""
+        where = f" (where it shows: {effect.regime})" if effect is not None and effect.regime else ""
         said = f"{joined} {'is' if len(names) == 1 else 'are'} hardly excited in these recordings{where}"
     else:
         errors = " and ".join(_percent(float(together[k])) for k in found.members)
