@@ -24,6 +24,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
 from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -87,8 +88,8 @@ class Graph:
                         executor.spin_once(timeout_sec=0.1)
                     if kind is not EventsExecutor:
                         executor.spin()
-            except AttributeError:
-                # rclpy's shutdown may take the guards away while the last wait is being set up.
+            except (AttributeError, InvalidHandle):
+                # rclpy's shutdown may take the guards away while the last wait is being set up, or a last callback ends.
                 if not self._closing:
                     raise
 

@@ -31,6 +31,31 @@ def test_one_unpunctual_sender_is_one(known: int, seed: int) -> None:
     assert found_after([1.0], known, seed=seed) is None
 
 
+def test_one_sender_that_falls_behind_and_catches_up_is_one() -> None:
+    """Its answers come later and later, up to 15 samples, over a hundred samples, and then in time again within twenty."""
+    watch = SenderWatch()
+    behind = np.concatenate([np.linspace(0.0, 15.0, 100), np.linspace(15.0, 0.0, 20), np.zeros(50)]).astype(int)
+    for k in range(1, len(behind)):
+        for _ in range(1 + behind[k - 1] - behind[k]):
+            watch.command()
+        assert not watch.sample(2)
+
+
+def test_a_second_sender_is_found_beside_one_that_loses_commands() -> None:
+    """Each tenth is lost for good: the second one gets no more time than it takes to send what a queue holds."""
+    watch = SenderWatch()
+    for k in range(1000):
+        if k % 10:
+            watch.command()
+        assert not watch.sample(2)
+    for k in range(1000, 1070):
+        for _ in range(2 if k % 10 else 1):
+            watch.command()
+        if watch.sample(2):
+            return
+    pytest.fail("the second sender isn't found")
+
+
 @pytest.mark.parametrize(("rate", "within"), [(1.0, 20), (0.2, 100), (0.05, 1000)])
 def test_a_second_sender_is_found(rate: float, within: int) -> None:
     found = found_after([1.0, rate], 2)

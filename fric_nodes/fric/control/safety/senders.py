@@ -1,13 +1,16 @@
 """Whether two senders command at the same time, where messages don't say who sent them.
 
 A controller answers each sample once; one that sends more often shows its rate while it is the only one known. With more than
-one sender known, what comes beyond that rate is added up, less a slow leak, and what lacks is taken off; a sum above the
-threshold means that two of them are at work. A sender that is known and silent, as a process that was killed stays for a
-while, adds nothing, and a controller that is only unpunctual makes up for samples without a command. What has queued up while
-this process was held up comes all at once: a single sample never counts so much that it passes the threshold.
+one sender known, what comes beyond that rate is added up, and what lacks is taken off; either is slowly forgotten. A sum above
+the threshold means that two of them are at work. A sender that is known and silent, as a process that was killed stays for a
+while, adds nothing, and a controller that is only unpunctual makes up for samples without a command: as many as its queue holds
+can still come. What has queued up while this process was held up comes all at once: a single sample never counts so much that
+it passes the threshold.
 """
 
 from __future__ import annotations
+
+import math
 
 __all__ = ["SenderWatch", "StreamWatch"]
 
@@ -15,6 +18,7 @@ _MANY = 3.0  # numerical: commands more than samples; the jitter of one sender s
 _MOST = 8.0  # numerical: the sum goes no further, so that it is down again soon after the second sender has left
 _BURST = 3.0  # numerical: a sample counts as at most so many; one of them alone stays below the threshold
 _SHARE = 0.02  # numerical: share of a new sample in the rate of a single sender
+_QUEUED = 50.0  # numerical: commands that lack and may still come; the queues of the nodes hold so many
 _LEAK = 0.01  # numerical: per sample; a second sender is found when it sends at more than a hundredth of the samples' rate
 
 
@@ -36,8 +40,8 @@ class SenderWatch:
         """A sample is over, and so many ``senders`` are known; True when more than one is at work."""
         share = min(self._commands / self._usual, _BURST)
         if senders > 1:
-            leaked = self._surplus - _LEAK if self._surplus > 0.0 else self._surplus
-            self._surplus = min(max(leaked + share - 1.0, -_MANY), _MOST)
+            leaked = self._surplus - math.copysign(min(_LEAK, abs(self._surplus)), self._surplus)
+            self._surplus = min(max(leaked + share - 1.0, -_QUEUED), _MOST)
         else:
             self._surplus = 0.0
             self._usual = max(self._usual + _SHARE * self._usual * (share - 1.0), 1.0)
