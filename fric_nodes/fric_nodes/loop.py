@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
 from .base import FricNode
@@ -84,6 +87,32 @@ class LoopNode(FricNode):
     def input_qos(self) -> QoSProfile:
         """With which the loop takes samples: every one of them in lock-step, the newest in wall time."""
         return SAMPLES if self.lock_step else LATEST
+
+    def take_in(self, kind: Any, topic: str, take: Callable[[Any], None]) -> Subscription:
+        """Give each message on ``topic`` to ``take``, in their order; in wall time together with all that have come after it.
+
+        The executors of rclpy that wait on a set of entities hand over one message a round, and only to one of the callbacks
+        that exclude each other. A node that has fallen behind would stay behind: it would take the oldest message of a full
+        queue each time, refuse it for its age, and seldom come to the topics that stand later in the set.
+        """
+        if self.lock_step:
+            return self.create_subscription(kind, topic, take, self.input_qos)
+        made: list[Subscription] = []
+
+        def take_all(message: Any) -> None:
+            take(message)
+            # A node that has just been taken down has no handle any more.
+            with suppress(InvalidHandle):
+                for subscription in made:
+                    with subscription.handle:
+                        for _ in range(self.input_qos.depth):
+                            waiting = subscription.handle.take_message(kind, False)
+                            if waiting is None:
+                                break
+                            take(waiting[0])
+
+        made.append(self.create_subscription(kind, topic, take_all, self.input_qos))
+        return made[0]
 
     def start_anew(self) -> None:
         """Forget who has listened so far, and how well deadlines were kept."""

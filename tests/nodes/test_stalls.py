@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from fric_nodes.loop import LoopNode
+from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.alone
 
 _SENDINGS = 6
+_WAITING = 40  # fewer than the queue of a loop in wall time holds
 
 H = 0.004
 MOTION = {
@@ -113,6 +117,34 @@ def test_bad_references_are_named_and_change_nothing(graph: Graph) -> None:
     begin = len(axis.positions)
     axis.until_moving()
     assert max(map(abs, axis.positions[begin:])) < 0.023
+
+
+@pytest.mark.parametrize("kind", [SingleThreadedExecutor, MultiThreadedExecutor, EventsExecutor])
+def test_messages_that_waited_are_taken_in_order_and_at_once(graph: Graph, kind: type[Executor]) -> None:
+    """An executor that hands over one message a round lets a node that fell behind stay behind."""
+    heard: list[float] = []
+    rounds: list[int] = []  # how many had been heard, after each round that brought some
+    node = graph.owns(LoopNode("late", (), context=graph.context()))
+    node.take_in(Float64, "numbers", lambda message: heard.append(message.data))
+    sender = graph.node("sender")
+    numbers = sender.create_publisher(Float64, "numbers", 100)
+    graph.meet(node, sender)
+    for k in range(_WAITING):
+        numbers.publish(Float64(data=float(k)))
+    time.sleep(0.5)  # a subscription with best effort acknowledges nothing
+    executor = kind(context=node.context)
+    executor.add_node(node)
+
+    def all_heard() -> bool:
+        executor.spin_once(timeout_sec=0.1)
+        if len(heard) > (rounds or [0])[-1]:
+            rounds.append(len(heard))
+        return len(heard) >= _WAITING
+
+    graph.until(all_heard, "all numbers")
+    executor.shutdown()
+    assert heard == [float(k) for k in range(_WAITING)]
+    assert len(rounds) < _WAITING / 4
 
 
 @pytest.mark.long

@@ -55,7 +55,7 @@ class CompensatorNode(ManagedNode):
         self._stamps, self._watch = StampClock(self), reference_guard(settings)
         self._watch.counters = self.counters
         self._answers: Answers[ReferencePoint, float] = Answers()
-        self.create_subscription(Reference, "reference", self._on_reference, self.input_qos)
+        self.take_in(Reference, "reference", self._on_reference)
 
     def activate(self) -> None:
         """Begin at rest."""

@@ -59,7 +59,7 @@ class ExcitationNode(LoopNode):
         self._seen = -1
         if self._plan.has_feedback:
             self._first = 0 if self.lock_step else -1
-            self.create_subscription(JointState, "joint_states", self._on_motion, self.input_qos)
+            self.take_in(JointState, "joint_states", self._on_motion)
         elif self.lock_step:
             self._period_ns = from_seconds(self.period)
             self._ahead = settings.integer("look_ahead")

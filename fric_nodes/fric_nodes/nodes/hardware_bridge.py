@@ -74,10 +74,10 @@ class HardwareBridgeNode(ManagedNode):
         self._state = JointState(name=[self.joint], position=[0.0])
         self._state.header.frame_id = self.joint
         self._publisher = self.create_publisher(JointState, "joint_states", SAMPLES)
-        self._commands = self.create_subscription(force_type(self), "force_command", self._on_command, self.input_qos)
+        self._commands = self.take_in(force_type(self), "force_command", self._on_command)
         self._wanted = (0, math.nan)
         if math.isfinite(self._layer.limits.following_error):
-            self.create_subscription(Reference, "reference", self._on_reference, self.input_qos)
+            self.take_in(Reference, "reference", self._on_reference)
         self.create_timer(self.period, self._tick, clock=self.steady)
 
     def activate(self) -> None:

@@ -55,10 +55,10 @@ class PidNode(ManagedNode):
             self._wall = WallControl(self, self._law, self._commands.publish)
         settings.test_together(lambda values: gains_of(values, self.period))
         settings.when_changed(self._on_settings)
-        self.create_subscription(JointState, "joint_states", self._on_state, self.input_qos)
-        self._references = self.create_subscription(Reference, "reference", self._on_reference, self.input_qos)
+        self.take_in(JointState, "joint_states", self._on_state)
+        self._references = self.take_in(Reference, "reference", self._on_reference)
         if self._adds:
-            self.create_subscription(force_type(self), "feedforward_force", self._on_feedforward, self.input_qos)
+            self.take_in(force_type(self), "feedforward_force", self._on_feedforward)
 
     def activate(self) -> None:
         """Answer joint states from now on."""

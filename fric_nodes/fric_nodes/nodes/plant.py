@@ -64,7 +64,7 @@ class PlantNode(ManagedNode):
         self._sample = 0
         self._output = AxisOutput(self, self._axis)
         self._model = ModelSwitch(self, self._axis, self._output)
-        commands = self.create_subscription(force_type(self), "force_command", self._on_command, self.input_qos)
+        commands = self.take_in(force_type(self), "force_command", self._on_command)
         self._in_time: PlantInTime | None = None
         if self.lock_step:
             self._in_step = PlantInLockStep(self, self._axis, self._output, self._last_sample, self._end)
