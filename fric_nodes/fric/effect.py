@@ -218,7 +218,8 @@ class Effect:
     def memory(self, velocity: float) -> Array:
         """The memory at the start of a run, in which the body moves with ``velocity`` [x/s], shape ``(n_memory,)``."""
         begins = np.zeros(self.n_memory)
-        begins[list(self.velocities)] = velocity
+        for place in self.velocities:
+            begins[place] = velocity
         return begins
 
     def constants(self, values: Sequence[float]) -> int:

@@ -184,7 +184,7 @@ class Model:
         It begins with ``velocity`` [x/s], and under ``force`` [F] at the contact where that is known.
         """
         slip = [held.effect.start(held.values, force) for held in self.terms if held.effect.slip is not None]
-        memory = [held.effect.memory(velocity) for held in self.terms]
+        memory = [held.effect.memory(velocity) for held in self.terms if held.effect.n_memory]
         return slip[0] if slip else np.zeros(0), np.concatenate([np.zeros(0), *memory])
 
     @property

@@ -86,6 +86,17 @@ def test_a_law_that_is_the_wrong_one_gives_way_and_takes_what_mended_it_along() 
     assert found.fit.model.value("stribeck.velocity") == pytest.approx(0.15, rel=0.1)
 
 
+def test_threads_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    track, begin, state = begun(BENT, grown=(ROUND, term("asymmetry", force=0.1, coefficient=0.1)))
+    came_to = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("FRIC_THREADS", threads)
+        found, said = moves(track, begin, state)
+        came_to.append((said, found.fit.model.prefixes, found.fit.model.values.tolist(), found.left))
+    assert came_to[0] == came_to[1]
+    assert len(came_to[0][0]) > 0
+
+
 @pytest.mark.parametrize("truth", [ROUND, HYSTERESIS], ids=["another name", "its own"])
 def test_an_effect_gives_way_to_the_one_that_it_looks_like(truth: Term) -> None:
     track, begin, state = begun(truth, DRAG, grown=(HYSTERESIS, DRAG))

@@ -178,7 +178,7 @@ def begun(track: Track, fit: Fit, tried: Sequence[Tried], scales: Scales, along:
         starts.append(along.fitted(grown, names, track.scale(grown, names), bounds_of(grown, scales)))
     shared = [grown, *(fit.model.with_terms((*fit.model.terms, spring)) for spring in _springs(tried, scales))]
     starts += [divided for divided in map(half_on_motor, shared) if divided is not None]
-    lacks = [float(np.sum(track.residual(model) ** 2)) for model in starts]
+    lacks = mapped(lambda model: float(np.sum(track.residual(model) ** 2)), starts)
     best = int(np.argmin(lacks))
     return Beginning(starts[best], lacks[best])
 

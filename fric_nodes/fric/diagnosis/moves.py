@@ -11,11 +11,12 @@ wrong one may then leave less.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from ..effect import Effect
 from ..model import Model, Term
+from ..threads import mapped
 from .along import Along
 from .candidates import Candidate, candidates, scales_of
 from .costs import NATS_PER_PARAMETER, law_of_form
@@ -112,13 +113,17 @@ class Search:
     def without_each(self, state: State, but: int | None = None) -> list[tuple[str, State]]:
         """``state`` with each brought term taken away but that at the place ``but``, everything else fitted anew."""
         model = state.fit.model
-        made = []
+        moves = []
         for k in self._brought_to(model):
             move = ("without", model.prefixes[k], "" if but is None else model.terms[but].effect.key)
             if k != but and self.is_worth(move):
-                left = self.judged(move, refit(self.track, without_place(model, k)))
-                made.append((f"without {model.terms[k].effect.title}", left))
-        return made
+                moves.append((move, f"without {model.terms[k].effect.title}", without_place(model, k)))
+        return self._made(moves)
+
+    def _made(self, moves: Sequence[tuple[tuple[str, ...], str, Model]]) -> list[tuple[str, State]]:
+        """What ``moves`` come to, each given with what it is called and the model that its fit begins with; on all cores."""
+        states = mapped(lambda move: refit(self.track, move[2]), moves)
+        return [(what, self.judged(move, state)) for (move, what, _), state in zip(moves, states, strict=True)]
 
     def elsewhere(self) -> list[tuple[str, State]]:
         """The same structure from other values of what isn't linear: what sticks or gives way makes one valley for each."""
@@ -126,15 +131,17 @@ class Search:
         bounds = bounds_of(state.fit.model, scales_of(self.track))
         now = float(state.fit.residual @ state.fit.residual)
         best = now, state.fit.model
+        moves = []
         for name, value, factor in self._moved(state.fit.model):
             low, high = bounds.get(name, (-math.inf, math.inf))
             move = ("from", name, str(factor))
             if low < value < high and self.is_worth(move):
-                start = state.fit.model.with_value(name, value)
-                fit = self.track.fit(start, state.fit.names, _ROUGHLY, bounds)
-                left = float(fit.residual @ fit.residual)
-                self.lost[move] = (0.5 * self.track.independent * math.log(max(left, 1e-300) / max(now, 1e-300)), self.won)
-                best = min(best, (left, fit.model), key=lambda each: each[0])
+                moves.append((move, state.fit.model.with_value(name, value)))
+        fits = mapped(lambda move: self.track.fit(move[1], state.fit.names, _ROUGHLY, bounds), moves)
+        for (move, _), fit in zip(moves, fits, strict=True):
+            left = float(fit.residual @ fit.residual)
+            self.lost[move] = (0.5 * self.track.independent * math.log(max(left, 1e-300) / max(now, 1e-300)), self.won)
+            best = min(best, (left, fit.model), key=lambda each: each[0])
         return [] if best[1] is state.fit.model else [("from other values", refit(self.track, best[1]))]
 
     def _moved(self, model: Model) -> list[tuple[str, float, float]]:
@@ -151,11 +158,9 @@ class Search:
         """With half of the friction on the motor's side of a transmission, or with none there."""
         model = self.state.fit.model
         tried = {"friction of the motor": half_on_motor(model), "no friction of the motor": all_on_load(model)}
-        return [
-            (what, self.judged((what,), refit(self.track, start)))
-            for what, start in tried.items()
-            if start is not None and self.is_worth((what,))
-        ]
+        return self._made(
+            [((what,), what, start) for what, start in tried.items() if start is not None and self.is_worth((what,))]
+        )
 
     def other_laws(self) -> list[tuple[str, State]]:
         """Each term by each other law of its effect; the best of these also with each other term taken away.
@@ -163,16 +168,19 @@ class Search:
         A law that is the wrong one may need a further term that mends it: neither move gains without the other.
         """
         model, scales = self.state.fit.model, scales_of(self.track)
-        made: list[tuple[str, int, State]] = []
+        moves, places = [], []
         for k in self.brought:
             for law in laws_in_place(self.track, self.state.fit, k):
                 move = ("by another law", model.prefixes[k], law.effect.key, *map(str, _shape_of(law)))
-                if not self.is_worth(move):
-                    continue
-                other, place = exchanged_at(model, k, law)
-                state = self.judged(move, refit(self.track, other))
-                if told(state.fit.model.terms[place], scales):
-                    made.append((f"{law.effect.title} by another law ({law.effect.law})", place, state))
+                if self.is_worth(move):
+                    other, place = exchanged_at(model, k, law)
+                    moves.append((move, f"{law.effect.title} by another law ({law.effect.law})", other))
+                    places.append(place)
+        made = [
+            (what, place, state)
+            for (what, state), place in zip(self._made(moves), places, strict=True)
+            if told(state.fit.model.terms[place], scales)
+        ]
         slips = any(state.fit.model.has_slip_dynamics for *_, state in made)
         made.sort(key=lambda each: -self.score(each[2], slips))
         fewer = [(f"{what}, {which}", state) for what, k, whole in made[:_LAWS] for which, state in self.without_each(whole, k)]
@@ -181,14 +189,14 @@ class Search:
     def simpler_laws(self) -> list[tuple[str, State]]:
         """Each term by the law that its own is a form of: beside the others, what the form has more may be nothing."""
         model = self.state.fit.model
-        made = []
+        moves = []
         for k in self.brought:
             held, law = model.terms[k], law_of_form(model.terms[k].effect)
             move = ("by the simpler law", model.prefixes[k])
             if law is not None and self.is_worth(move):
                 other, _ = exchanged_at(model, k, Term(law, tuple(law.values(held.by_name))))
-                made.append((f"{held.effect.title} by a simpler law", self.judged(move, refit(self.track, other))))
-        return made
+                moves.append((move, f"{held.effect.title} by a simpler law", other))
+        return self._made(moves)
 
     def mended(self) -> bool:
         """Whether other values or laws of the same effects have become the better ones."""
@@ -220,14 +228,15 @@ class Search:
                 continue
             without = refit(self.track, begun_without)
             alone = [Candidate(each.effect, (trial,)) for each in like for trial in each.trials]
+            starts = []
             for effect_id in dict.fromkeys(each.effect.id for each in like):
                 of_it = [each for each in alone if each.effect.id == effect_id]
                 tried = screen(self.track, without.fit, of_it, without.chance, in_pairs=False).tried
-                starts = [begun(self.track, without.fit, [each], scales, along).model for each in tried[:_LAWS]]
-                states = [refit(self.track, start) for start in starts]
-                for state in sorted(states, key=lambda each: each.left)[:1]:
-                    self.judged(("exchanged", model.prefixes[k], effect_id), state)
-                made += [(f"{effect_id} in the place of {held.id}", state) for state in states]
+                starts += [(effect_id, begun(self.track, without.fit, [each], scales, along).model) for each in tried[:_LAWS]]
+            states = mapped(lambda start: (start[0], refit(self.track, start[1])), starts)
+            for effect_id, state in sorted(states, key=lambda each: each[1].left, reverse=True):
+                self.judged(("exchanged", model.prefixes[k], effect_id), state)  # the best of an effect comes last
+            made += [(f"{effect_id} in the place of {held.id}", state) for effect_id, state in states]
         return made
 
 

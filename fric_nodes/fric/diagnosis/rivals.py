@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..model import Model
+from ..threads import mapped
 from .candidates import Scales
 from .costs import NATS_PER_PARAMETER
 from .fitting import State, bounds_of, free_names, is_driven, shaken, unseen
@@ -50,11 +52,10 @@ def rivals_of(track: Track, state: State, found: Screening, scales: Scales, to_b
         to_beat: what something else leaves in their place [F^2]. Where that is hardly anything, fewer candidates are tried; a
             rival that is far from it after its rough fit gets no further iterations, and no other forms.
     """
-    fitted: list[Rival] = []
     much = state.floor + max(_ROUGH * state.excess, OF_FLOOR * state.floor)
-    for offer, beginning in offered(track, state, found, scales, to_beat > much).items():
-        fit = _first_fit(track, state, beginning.model, scales)
-        fitted.append(rival_of(track, state, offer, fit, found))
+    begun = offered(track, state, found, scales, to_beat > much)
+    fits = mapped(lambda beginning: _first_fit(track, state, beginning.model, scales), begun.values())
+    fitted = [rival_of(track, state, offer, fit, found) for offer, fit in zip(begun, fits, strict=True)]
     fitted = side_by_side(track, fitted, found.unpaid)
     for k in _worth_refining(state, fitted):
         rival = fitted[k]
@@ -129,8 +130,9 @@ def _fitted_out(track: Track, state: State, fitted: list[Rival], found: Screenin
     for k in list(close.values())[:_FITTED_OUT]:
         rival = fitted[k]
         bounds = bounds_of(rival.fit.model, scales)
-        begun_again = [rival.fit, *(track.fit(m, rival.fit.names, _AGAIN, bounds) for m in _elsewhere(rival, scales))]
-        best = min(begun_again, key=lambda each: float(each.residual @ each.residual))
+        names, starts = rival.fit.names, _elsewhere(rival, scales)
+        again = mapped(partial(track.fit, names=names, max_iterations=_AGAIN, bounds=bounds), starts)
+        best = min([rival.fit, *again], key=lambda each: float(each.residual @ each.residual))
         other = rival_of(track, state, rival.offer, track.fit(best.model, best.names, 8, bounds), found)
         if other.left < rival.left:
             result[k] = replace(other, dear=rival.dear)

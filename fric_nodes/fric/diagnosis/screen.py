@@ -185,6 +185,7 @@ class Promise:
             missing, columns = self._base, along.changes(fit.model, fit.names, fit.scale)[self._rows]
         self._basis, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
         self._missing = missing - self._basis @ (self._basis.T @ missing)
+        self._periods: dict[tuple[bool, float], list[float]] = {}  # several effects ask for the same
 
     def narrowed(self, candidate: Candidate) -> list[Term]:
         """The trials of ``candidate`` that promise most."""
@@ -208,9 +209,11 @@ class Promise:
         travel, finest = float(np.ptp(position)), min(trial.values[at] for trial in candidate.trials)
         # Slowly moved over, it comes more slowly, and the observer sees it.
         seen = SEEN * self._along.bandwidth / (2.0 * np.pi * float(np.quantile(np.abs(velocity), SLOWLY)))
-        missing = self._missing * np.sign(velocity) if candidate.effect.level is not None else self._missing
-        periods = fine_periods(position, missing, travel / finest, seen * travel)
-        given = candidate.trials[0].values
+        directed, fewest = candidate.effect.level is not None, travel / finest
+        if (directed, fewest) not in self._periods:
+            missing = self._missing * np.sign(velocity) if directed else self._missing
+            self._periods[directed, fewest] = fine_periods(position, missing, fewest, seen * travel)
+        periods, given = self._periods[directed, fewest], candidate.trials[0].values
         return [Term(candidate.effect, (*given[:at], period, *given[at + 1 :])) for period in periods]
 
     def _of(self, trial: Term) -> float:

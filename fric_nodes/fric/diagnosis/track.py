@@ -115,23 +115,23 @@ class Track(Runs):
         loops, linked, plant_values = model.linked_loops, model.linked, np.array(model.plant_values)
         inertia = model.total_inertia
         parts = []
-        for k, whole in enumerate(self.runs):
-            first, n = self._first(model, k), whole.effort.shape[0]
-            run = whole.part(first, n) if first else whole
-            effort = run.effort if twin is None else twin.efforts[k][first:]
-            extra = _NOTHING if twin is None else twin.extras[k][first:]
-            position = run.position if twin is None else twin.positions[k][first:]
-            alpha, beta = self.gains(whole)
-            state = np.append(model.plant.start(plant_values, *run.start), self.begin(k, first))
-            found = np.zeros(n)
-            around = run.step, self.n_substeps(model, whole), run.load, run.temperature, alpha, beta
-            last = state, *self.inner_states(model, k, run.start[1]), found[first:]
-            if mass is None:
-                loops.observe(linked, effort, position, *around, self.noise[k], *last)
-            else:
-                gain = min(mass / inertia, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
-                loops.pursue(linked, effort, extra, position, *around, gain, self.noise[k], *last)
-            with np.errstate(over="ignore"):  # a model that escapes has no number for it
+        with np.errstate(over="ignore"):  # a model that escapes has no number for it
+            for k, whole in enumerate(self.runs):
+                first, n = self._first(model, k), whole.effort.shape[0]
+                run = whole.part(first, n) if first else whole
+                effort = run.effort if twin is None else twin.efforts[k][first:]
+                extra = _NOTHING if twin is None else twin.extras[k][first:]
+                position = run.position if twin is None else twin.positions[k][first:]
+                alpha, beta = self.gains(whole)
+                state = np.append(model.plant.start(plant_values, *run.start), self.begin(k, first))
+                found = np.zeros(n)
+                around = run.step, self.n_substeps(model, whole), run.load, run.temperature, alpha, beta
+                last = state, *self.inner_states(model, k, run.start[1]), found[first:]
+                if mass is None:
+                    loops.observe(linked, effort, position, *around, self.noise[k], *last)
+                else:
+                    gain = min(mass / inertia, _MOST_GAIN / (2.0 * alpha + beta), _LIGHTEST)
+                    loops.pursue(linked, effort, extra, position, *around, gain, self.noise[k], *last)
                 parts.append((inertia if mass is None else mass) * beta / whole.sample_time**2 * found)
         return self._finite(self.joined(parts))
 
@@ -181,8 +181,15 @@ class Track(Runs):
 
     def _finite(self, signal: Array) -> Array:
         """``signal`` without what no solver can use."""
-        most = _LARGEST * max(float(np.ptp(run.effort)) for run in self.runs)
-        return np.clip(np.nan_to_num(signal, nan=most, posinf=most, neginf=-most), -most, most)
+        most = self._most
+        if not np.all(np.isfinite(signal)):
+            signal = np.nan_to_num(signal, nan=most, posinf=most, neginf=-most)
+        return np.clip(signal, -most, most)
+
+    @cached_property
+    def _most(self) -> float:
+        """The largest force [F] that a model may seem to lack."""
+        return _LARGEST * max(float(np.ptp(run.effort)) for run in self.runs)
 
     def _applied(self, model: Model) -> list[Array]:
         """What comes out of the command path of ``model`` [F], per run; that of the last model is kept."""

@@ -13,10 +13,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from ...model import Model
+from ...threads import mapped
 from ..costs import EVIDENCE
 from ..deadline import is_over
 from ..fitting import NOTHING, State, added, left_beside, refit, unseen, without_place
@@ -136,7 +138,8 @@ def _pruned(track: Track, state: State, begin: State, weighed: Weighed, tell: Ca
     while going:
         going = False
         weigh = weighed(state)
-        left = {k: _left_without(track, state, k) for k in added(begin.fit.model, state.fit.model)}
+        places = added(begin.fit.model, state.fit.model)
+        left = dict(zip(places, mapped(partial(_left_without, track, state), places), strict=True))
         for place in sorted(left, key=lambda k: left[k]):
             nats, without = weigh(place)
             if nats < EVIDENCE:
