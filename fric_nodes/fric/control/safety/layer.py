@@ -77,6 +77,7 @@ class SafetyLayer:
         self._states = StampGate(limits.state_timeout, limits.clock_tolerance)
         self._commands = StampGate(limits.command_timeout, limits.clock_tolerance)
         self._hold = Hold(limits)
+        self._senders = SenderWatch()
         self._events: list[Event] = []
         self._now: int | None = None
         self._hit = ""
@@ -88,9 +89,9 @@ class SafetyLayer:
         self._source: str | None = None
         self._commands.newest = self._states.newest = None
         self._refused: dict[str, str] = {}
-        self._jumps = self._contradictions = self._burst = 0
+        self._jumps = self._contradictions = 0
         self._publishers = 1
-        self._senders = SenderWatch()
+        self._senders.forget()
         self._blind = False
         self.resuming = False
         self._asked = self._deadline = 0
@@ -116,7 +117,6 @@ class SafetyLayer:
         self._source = source
         self._commands.newest = stamp
         self._wanted = force
-        self._burst += 1
         self._senders.command()
         self._refused.pop("command", None)
         return True
@@ -211,7 +211,7 @@ class SafetyLayer:
         if not keep:
             self._source = None
         self._asked = now
-        self._burst = 0
+        self._senders.begin()
         self.resuming = False
 
     def disable(self, now: int) -> None:
@@ -305,6 +305,8 @@ class SafetyLayer:
         if passed < -limits.clock_tolerance:
             self.fail("clock went back", f"by {-passed:.6g} s", now)
         passed = min(max(passed, 0.0), limits.longest_step)
+        if not between:
+            self._senders.tick(now)
         if self.state is State.ENABLED:
             self._watch(now, reference, between)
         elif self.resuming and not (self._states.lost(now) or self._commands.lost(now)) and self._motion.known:
@@ -329,9 +331,8 @@ class SafetyLayer:
         """Look for what ends the enabled state."""
         limits, motion = self.limits, self._motion
         if not between:
-            if self._burst > _BURST:
+            if self._senders.commands > _BURST:
                 self.counters["command burst"] += 1
-            self._burst = 0
             self._senders.sample(self._publishers)
         if self._senders.many:
             self.fail("second command source", f"{self._publishers} publishers, more commands than samples", now)
